@@ -26,6 +26,7 @@
 #define MOST_ITEMS     3000
 #define PATHS_CHECKED  8 /* or so many paths */
 #define PATH_TOLERANCE 1e-8
+#define HELD_ROW       1e-12 /* of what a force at a tangent moves, beside its block */
 #define ROUNDING       1e-14 /* of a coefficient beside others */
 #define SAMPLES        120   /* points for the functions, of which a third checks them; more with weights of samples: */
 #define SEVERAL        20    /* samples: with more, products are tried of known functions alone */
@@ -426,7 +427,8 @@ static PetscErrorCode FindOutputs(Export *e)
 
 /* -- the problem -- */
 
-/* The rows of contacts with friction, and their blocks: those that a force along the normal moves, moves[] by row. */
+/* The rows of contacts with friction, and their blocks: those that a force along the normal moves, moves[] by row, without
+   tangents that nothing moves. */
 static PetscErrorCode FindBlocks(Export *e, const PetscReal moves[])
 {
   const HycoPairs *pairs = &e->m->model->pairs;
@@ -441,9 +443,12 @@ static PetscErrorCode FindBlocks(Export *e, const PetscReal moves[])
   for (PetscInt k = 0; k < pairs->n; k++) {
     const PetscBool rubs = (PetscBool)(e->s->contact[pairs->contact[k]]->friction != NULL);
     const PetscInt rows = rubs ? e->m->model->mesh->dim : 1;
+    PetscReal most = 0;
 
     e->first[k] = at;
+    for (PetscInt r = at; r < at + rows && moves[at] > 0; r++) most = PetscMax(most, moves[r]);
     for (PetscInt r = at; r < at + rows && moves[at] > 0; r++) {
+      if (r > at && moves[r] <= HELD_ROW * most) continue;
       o->m.normal[e->k] = r == at;
       e->contact[e->k++] = r;
     }
@@ -591,51 +596,27 @@ static void Scale(const Export *e, const Samples *o, PetscReal scale[])
   }
 }
 
-/* The rows of a part, of all points. */
-static PetscErrorCode Select(const HycoFitData *all, PetscInt n, const PetscInt row[], PetscReal **y, PetscInt **group)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1((size_t)all->n_points * (size_t)n + 1, y));
-  PetscCall(PetscMalloc1(n + 1, group));
-  for (PetscInt k = 0; k < n; k++) {
-    (*group)[k] = all->group[row[k]];
-    for (PetscInt i = 0; i < all->n_points; i++)
-      (*y)[(size_t)i * (size_t)n + (size_t)k] = all->y[(size_t)i * (size_t)all->n_rows + (size_t)row[k]];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Adds the functions and coefficients of some rows to fit, whose coefficients then are rows x functions; the functions of
-   other rows have the coefficient 0. */
+/* Adds the functions and coefficients of some rows to fit, whose coefficients are those of all n_rows; the functions of other
+   rows have the coefficient 0. */
 static PetscErrorCode Join(const HycoExportFit *part, PetscInt n, const PetscInt row[], PetscInt n_rows,
                            HycoExportFit *fit)
 {
-  PetscReal *coefficient;
-  PetscInt *place, more = fit->n;
+  const size_t all = (size_t)n_rows;
 
   PetscFunctionBegin;
-  PetscCall(PetscRealloc((size_t)(fit->n + part->n) * sizeof(*fit->function), &fit->function));
-  PetscCall(PetscMalloc1(part->n, &place));
   for (PetscInt k = 0; k < part->n; k++) {
-    place[k] = 0;
-    while (place[k] < more && memcmp(&fit->function[place[k]], &part->function[k], sizeof(*part->function)) != 0)
-      place[k]++;
-    if (place[k] == more) fit->function[more++] = part->function[k];
+    PetscInt at = 0;
+
+    while (at < fit->n && memcmp(&fit->function[at], &part->function[k], sizeof(*part->function)) != 0) at++;
+    if (at == fit->n) {
+      HYCO_ADD(at, fit->function, part->function[k]);
+      HYCO_ADD(at, fit->size, part->size[k]);
+      PetscCall(PetscRealloc((size_t)++fit->n * all * sizeof(PetscReal), &fit->coefficient));
+      PetscCall(PetscArrayzero(fit->coefficient + (size_t)at * all, all));
+    }
+    for (PetscInt r = 0; r < n; r++)
+      fit->coefficient[(size_t)at * all + (size_t)row[r]] = part->coefficient[(size_t)k * (size_t)n + (size_t)r];
   }
-  PetscCall(PetscCalloc1((size_t)more * (size_t)n_rows + 1, &coefficient));
-  for (PetscInt r = 0; r < n_rows; r++) {
-    for (PetscInt k = 0; k < fit->n; k++)
-      coefficient[(size_t)r * (size_t)more + (size_t)k] = fit->coefficient[(size_t)r * (size_t)fit->n + (size_t)k];
-  }
-  for (PetscInt r = 0; r < n; r++) {
-    for (PetscInt k = 0; k < part->n; k++)
-      coefficient[(size_t)row[r] * (size_t)more + (size_t)place[k]] =
-          part->coefficient[(size_t)r * (size_t)part->n + (size_t)k];
-  }
-  PetscCall(PetscFree(place));
-  PetscCall(PetscFree(fit->coefficient));
-  fit->coefficient = coefficient;
-  fit->n = more;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -643,7 +624,8 @@ static PetscErrorCode Join(const HycoExportFit *part, PetscInt n, const PetscInt
    they belong: the rows without forces have products of them. */
 static PetscErrorCode FindSeeds(Export *e, PetscInt first, const HycoExportFit *from, PetscInt *n, HycoFunction seed[])
 {
-  const PetscInt g = e->group[first], places = e->n_groups - (e->travel ? e->travel->bodies->bodies->n : 0);
+  const PetscInt from_rows = from == &e->response ? 2 * e->ny : e->ny, g = e->group[first],
+                 places = e->n_groups - (e->travel ? e->travel->bodies->bodies->n : 0);
 
   PetscFunctionBegin;
   *n = 0;
@@ -656,65 +638,61 @@ static PetscErrorCode FindSeeds(Export *e, PetscInt first, const HycoExportFit *
                                                   : at >= 0 && e->travel->value[at].from == FLEXIBLE &&
                                                         e->travel->value[at].index == g - places);
 
-      has = (PetscBool)(of && from->coefficient[(size_t)r * (size_t)from->n + (size_t)k] != 0);
+      has = (PetscBool)(of && from->coefficient[(size_t)k * (size_t)from_rows + (size_t)r] != 0);
     }
     if (has) seed[(*n)++] = from->function[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Functions of the first level that suffices for rows, up to the last one; else of that. */
-static PetscErrorCode FitRows(Export *e, PetscInt last, const HycoFitData *all, PetscInt n, const PetscInt row[],
-                              HycoExportFit *fit)
+/* Functions of the first level that suffices for data's rows, up to the last one; else the nearest ones. */
+static PetscErrorCode FitRows(Export *e, PetscInt last, const HycoFitData *data, HycoExportFit *fit)
 {
   const HycoExportFit *from =
-      e->group[row[0]] < e->n_groups - (e->travel ? e->travel->bodies->bodies->n : 0) ? &e->response : fit;
+      e->group[data->row[0]] < e->n_groups - (e->travel ? e->travel->bodies->bodies->n : 0) ? &e->response : fit;
   HycoFunction *seed;
   PetscInt n_seeds = 0;
-  HycoFitData data = {all->n_points, n, all->atom, NULL, NULL, all->scale};
-  HycoExportFit part = {.worst = PETSC_MAX_REAL};
-  PetscReal *y;
-  PetscInt *group;
+  HycoExportFit part = {.worst = PETSC_MAX_REAL}, trial = {0}, kept; /* the best so far; the last one */
 
   PetscFunctionBegin;
-  PetscCall(Select(all, n, row, &y, &group));
-  data.y = y;
-  data.group = group;
   PetscCall(PetscMalloc1(PetscMax(from->n, 1), &seed));
   if (e->n_weights > SEVERAL) last = PetscMin(last, 1);
-  if (e->travel && fit == &e->base) PetscCall(FindSeeds(e, row[0], from, &n_seeds, seed));
-  for (PetscInt level = n_seeds ? -1 - e->atoms.n : 0; level <= last && part.worst > EXACT; level++) {
-    HycoFreeAll(&part.function, &part.coefficient);
-    PetscCall(HycoFitFunctions(&e->atoms, level, n_seeds, seed, EXACT, &data, &part));
+  if (e->travel && fit == &e->base) PetscCall(FindSeeds(e, data->row[0], from, &n_seeds, seed));
+  for (PetscInt together = 0; together < 2; together++) {
+    for (PetscInt level = n_seeds ? -1 - e->atoms.n : 0; level <= last && part.worst > EXACT; level++) {
+      PetscCall(HycoFitFunctions(&e->atoms, level, (PetscBool)together, n_seeds, seed, EXACT, data, &trial));
+      if (trial.worst > part.worst) continue;
+      kept = part;
+      part = trial;
+      trial = kept;
+    }
   }
+  PetscCall(HycoExportFitFree(&trial));
   PetscCall(PetscFree(seed));
-  if (!part.function) part.n = 0; /* too many were left */
-  PetscCall(Join(&part, n, row, all->n_rows, fit));
+  PetscCall(Join(&part, data->n_rows, data->row, data->stride, fit));
   if (part.worst > fit->worst || !fit->worst) {
     fit->worst = part.worst;
-    fit->worst_row = row[part.worst_row];
+    fit->worst_row = part.worst_row;
   }
-  HycoFreeAll(&part.function, &part.coefficient);
-  HycoFreeAll(&y, &group);
+  PetscCall(HycoExportFitFree(&part));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Of all rows at once, or where surfaces move of each group, whose values have few functions of the many. */
-static PetscErrorCode Fit(Export *e, PetscInt last, const HycoFitData *data, HycoExportFit *fit)
+static PetscErrorCode Fit(Export *e, PetscInt last, HycoFitData data, HycoExportFit *fit)
 {
   PetscInt *row;
 
   PetscFunctionBegin;
-  HycoFreeAll(&fit->function, &fit->coefficient);
-  *fit = (HycoExportFit){0};
-  PetscCall(PetscMalloc1(data->n_rows + 1, &row));
+  PetscCall(HycoExportFitFree(fit));
+  PetscCall(PetscMalloc1(data.stride + 1, &row));
+  data.row = row;
   for (PetscInt g = 0; g < (e->travel ? e->n_groups : 1) && fit->worst <= EXACT; g++) {
-    PetscInt n = 0;
-
-    for (PetscInt r = 0; r < data->n_rows; r++) {
-      if (!e->travel || data->group[r] == g) row[n++] = r;
+    data.n_rows = 0;
+    for (PetscInt r = 0; r < data.stride; r++) {
+      if (!e->travel || data.group[r] == g) row[data.n_rows++] = r;
     }
-    if (n && (!e->travel || data->scale[g] > 0)) PetscCall(FitRows(e, last, data, n, row, fit));
+    if (data.n_rows && (!e->travel || data.scale[g] > 0)) PetscCall(FitRows(e, last, &data, fit));
   }
   PetscCall(PetscFree(row));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -732,11 +710,11 @@ static PetscErrorCode FitBoth(Export *e, PetscInt fixed, PetscInt times)
   PetscCall(PetscMalloc1((size_t)o.n * (size_t)e->atoms.n + 1, &value));
   PetscCall(HycoAtomsTabulate(e->s, &e->atoms, o.n, o.mu, value));
   Scale(e, &o, scale);
-  PetscCall(Fit(e, e->travel ? HYCO_FIT_LEVELS - 2 : 1, &(HycoFitData){o.n, 2 * e->ny, value, o.added, e->group, scale},
-                &e->response));
+  PetscCall(Fit(e, e->travel ? HYCO_FIT_LEVELS - 2 : 1,
+                (HycoFitData){o.n, e->atoms.n, 2 * e->ny, 0, value, o.added, NULL, e->group, scale}, &e->response));
   /* If the response has no functions the export is refused anyway: the costly levels are left out. */
   PetscCall(Fit(e, e->response.worst > EXACT ? 0 : HYCO_FIT_LEVELS - 1,
-                &(HycoFitData){o.n, e->ny, value, o.y, e->group, scale}, &e->base));
+                (HycoFitData){o.n, e->atoms.n, e->ny, 0, value, o.y, NULL, e->group, scale}, &e->base));
   HycoFreeAll(&o.y, &o.added, &o.mu, &scale, &value);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -922,44 +900,24 @@ static PetscErrorCode AddValues(Export *e, const PetscReal mu[], const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* size[n]: of functions at the ends, the middle and between, where a weight of a sample is not 0 everywhere. */
-static PetscErrorCode SizeFunctions(Export *e, PetscInt n, const HycoFunction f[], PetscReal size[])
-{
-  PetscReal *value, mu[HYCO_MAX_PARAMETERS];
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(n + 1, &value));
-  PetscCall(PetscArrayzero(size, n));
-  for (PetscInt k = 0; k < 7; k++) {
-    for (PetscInt p = 0; p < e->s->n_variables; p++)
-      mu[p] = e->s->lo[p] + (e->s->hi[p] - e->s->lo[p]) * (k < 3 ? (PetscReal)k / 2 : 0.07 + 0.23 * (PetscReal)(k - 3));
-    PetscCall(HycoFunctionsEvaluate(e->s, &e->atoms, n, f, mu, value));
-    for (PetscInt i = 0; i < n; i++) size[i] = PetscMax(size[i], PetscAbsReal(value[i]));
-  }
-  PetscCall(PetscFree(value));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Coefficients of gaps and of values without forces that are round-off beside the others of their group are 0, so
    that nothing presses where there are no loads. */
 static PetscErrorCode DropRounding(Export *e)
 {
-  const PetscInt n = e->base.n;
-  PetscReal *size, *most;
+  PetscReal *most;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(n + 1, &size));
   PetscCall(PetscCalloc1(e->n_groups, &most));
-  PetscCall(SizeFunctions(e, n, e->base.function, size));
   for (PetscInt pass = 0; pass < 2; pass++) {
-    for (PetscInt i = 0; i < e->ny * n; i++) {
-      PetscReal *of = &most[e->group[i / n]], *c = &e->base.coefficient[i];
+    for (PetscInt i = 0; i < e->ny * e->base.n; i++) {
+      const PetscReal size = PetscAbsReal(e->base.coefficient[i]) * e->base.size[i / e->ny];
+      PetscReal *of = &most[e->group[i % e->ny]];
 
-      if (!pass) *of = PetscMax(*of, PetscAbsReal(*c) * size[i % n]);
-      if (pass && PetscAbsReal(*c) * size[i % n] <= ROUNDING * *of) *c = 0;
+      if (!pass) *of = PetscMax(*of, size);
+      if (pass && size <= ROUNDING * *of) e->base.coefficient[i] = 0;
     }
   }
-  HycoFreeAll(&size, &most);
+  PetscCall(PetscFree(most));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -970,19 +928,18 @@ static PetscErrorCode KeepTerms(Export *e, const PetscInt place[], const PetscRe
   Model *o = &e->out.m;
   const size_t n = (size_t)(e->p + e->k);
   const PetscInt n_f = e->response.n;
-  PetscReal *scale, *size;
+  PetscReal *size;
   size_t *from = NULL;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(n_f, &scale, n_f, &size));
-  PetscCall(SizeFunctions(e, n_f, e->response.function, scale));
+  PetscCall(PetscMalloc1(n_f + 1, &size));
   for (PetscInt r = 0; r < e->n_rows; r++) {
     PetscReal most = 0;
 
     for (PetscInt f = 0; f < n_f; f++) {
       size[f] = 0;
       for (size_t c = 0; c < n; c++)
-        size[f] = PetscMax(size[f], scale[f] * e->unit[c >= (size_t)e->p] *
+        size[f] = PetscMax(size[f], e->response.size[f] * e->unit[c >= (size_t)e->p] *
                                         PetscAbsReal(T[((size_t)f * (size_t)e->n_rows + (size_t)r) * n + c]));
       most = PetscMax(most, size[f]);
     }
@@ -997,8 +954,7 @@ static PetscErrorCode KeepTerms(Export *e, const PetscInt place[], const PetscRe
   PetscCall(PetscMalloc1((size_t)o->n_terms * n + 1, &o->term));
   for (size_t i = 0; i < n * (size_t)o->n_terms; i++)
     o->term[i] = T[from[i % (size_t)o->n_terms] + i / (size_t)o->n_terms];
-  PetscCall(PetscFree(from));
-  PetscCall(PetscFree2(scale, size));
+  HycoFreeAll(&from, &size);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -1048,7 +1004,7 @@ static PetscErrorCode Fill(Export *e)
   for (PetscInt r = 0; r < e->ny; r++) {
     for (PetscInt j = 0; j < e->base.n; j++)
       o->m.offset[(size_t)r * (size_t)o->m.n_functions + (size_t)place[j]] =
-          e->base.coefficient[(size_t)r * (size_t)e->base.n + (size_t)j];
+          e->base.coefficient[(size_t)j * (size_t)e->ny + (size_t)r];
   }
   o->m.n_parameters = (int)e->s->n_parameters;
   o->m.code = o->code.text;
@@ -1296,7 +1252,8 @@ static PetscErrorCode ExportC(HycoROM m, const char path[], char **description)
   ierr = Build(&e);
   if (!ierr) ierr = HycoExportWrite(&e.out, e.s, m->model->path, path, description);
   HycoPointEnd(point);
-  HycoFreeAll(&e.base.function, &e.base.coefficient, &e.response.function, &e.response.coefficient);
+  PetscCall(HycoExportFitFree(&e.base));
+  PetscCall(HycoExportFitFree(&e.response));
   PetscCall(HycoTravelDestroy(&e.travel));
   if (e.z) PetscCall(PetscFree4(e.z, e.w, e.unit, e.contact));
   for (PetscInt i = 0; i < e.n_weights; i++) PetscCall(PetscFree(e.weight[i]));

@@ -52,22 +52,24 @@ PetscErrorCode HycoAtomsTabulate(HycoScene scene, const HycoAtoms *atoms, PetscI
 
 /* Linear combinations of functions of the parameters that give data at points exactly: a subset of candidates. */
 typedef struct {
-  PetscInt n_points, n_rows; /* y: n_points x n_rows */
-  const PetscReal *atom, *y; /* atom: n_points x atoms: their values */
-  const PetscInt *group;     /* by row: its group, */
-  const PetscReal *scale;    /* which has a scale of errors; 0: all is 0 */
+  PetscInt n_points, n_atoms, stride, n_rows;
+  const PetscReal *atom, *y;   /* n_points x n_atoms: their values; n_points x stride, of which */
+  const PetscInt *row, *group; /* these rows; by row of y: its group, */
+  const PetscReal *scale;      /* which has a scale of errors; 0: all is 0 */
 } HycoFitData;
 typedef struct {
   PetscInt n;
   HycoFunction *function;
-  PetscReal *coefficient; /* n_rows x n */
-  PetscReal worst;        /* error at the points that were not fitted (each third), relative to the group */
+  PetscReal *coefficient, *size; /* n x rows; the largest value of each function */
+  PetscReal worst;               /* error at the points that were not fitted (each third), relative to the group */
   PetscInt worst_row;
 } HycoExportFit;
+PetscErrorCode HycoExportFitFree(HycoExportFit *fit);
 /* The functions are those of a level: 1, a; from 1 on 1/c, a/c; from 2 on a b; from 3 on a b / c; from 4 on a b d. At level -1 they are those of
-   seed[], and their products with one atom; at level -2 - k with atom k. worst > tol: they do not suffice, or are too many to be tried. The caller frees both arrays. */
-PetscErrorCode HycoFitFunctions(const HycoAtoms *atoms, PetscInt level, PetscInt n_seeds, const HycoFunction seed[],
-                                PetscReal tol, const HycoFitData *data, HycoExportFit *fit);
+   seed[], and their products with one atom; at level -2 - k with atom k. They are chosen one by one, which may miss some that depend nearly on others; or
+   (together) all, if they are few. worst > tol: they do not suffice, or are too many to be tried. The caller frees the fit. */
+PetscErrorCode HycoFitFunctions(const HycoAtoms *atoms, PetscInt level, PetscBool together, PetscInt n_seeds,
+                                const HycoFunction seed[], PetscReal tol, const HycoFitData *data, HycoExportFit *fit);
 #define HYCO_FIT_LEVELS 5
 /* value[n]: of the functions at mu. */
 PetscErrorCode HycoFunctionsEvaluate(HycoScene scene, const HycoAtoms *atoms, PetscInt n, const HycoFunction f[],

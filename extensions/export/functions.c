@@ -244,35 +244,33 @@ static PetscBool Held(PetscInt k)
   return (PetscBool)(k % 3 == 2);
 }
 
-/* values[k * N + i] of the functions at all N points. */
-static void Tabulate(PetscInt n_atoms, const HycoFitData *d, PetscInt n, const HycoFunction f[], PetscReal value[])
+/* Value r of the fit's rows at point i; the scale of its errors. */
+static PetscReal Y(const HycoFitData *d, PetscInt i, PetscInt r)
 {
-  for (PetscInt i = 0; i < d->n_points; i++) {
-    for (PetscInt k = 0; k < n; k++)
-      value[(size_t)k * (size_t)d->n_points + (size_t)i] = product(f[k].of, d->atom + (size_t)i * (size_t)n_atoms);
-  }
+  return d->y[(size_t)i * (size_t)d->stride + (size_t)d->row[r]];
 }
 
-/* Drops functions that are 0 or not finite somewhere. */
-static PetscErrorCode Clean(PetscInt N, PetscInt *n, HycoFunction f[], PetscReal value[])
+static PetscReal ScaleOf(const HycoFitData *d, PetscInt r)
+{
+  return d->scale[d->group[d->row[r]]];
+}
+
+/* values[k * N + i] of the functions at all N points, without those that are 0 or not finite somewhere. */
+static void Tabulate(const HycoFitData *d, PetscInt *n, HycoFunction f[], PetscReal value[])
 {
   PetscInt kept = 0;
 
-  PetscFunctionBegin;
   for (PetscInt k = 0; k < *n; k++) {
-    const PetscReal *v = value + (size_t)k * (size_t)N;
-    PetscReal most = 0, sum = 0;
+    PetscReal *v = value + (size_t)kept * (size_t)d->n_points, most = 0, sum = 0;
 
-    for (PetscInt i = 0; i < N; i++) {
+    for (PetscInt i = 0; i < d->n_points; i++) {
+      v[i] = product(f[k].of, d->atom + (size_t)i * (size_t)d->n_atoms);
       most = PetscMax(most, PetscAbsReal(v[i]));
       sum += v[i];
     }
-    if (most == 0 || PetscIsInfOrNanReal(sum)) continue;
-    PetscCall(PetscArraymove(value + (size_t)kept * (size_t)N, v, N));
-    f[kept++] = f[k];
+    if (most > 0 && !PetscIsInfOrNanReal(sum)) f[kept++] = f[k];
   }
   *n = kept;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Combinations of the rows at the fitted points, in units of their groups: target[MIXED * N], other points 0. */
@@ -280,16 +278,14 @@ static void Mix(const HycoFitData *d, PetscReal target[])
 {
   for (PetscInt i = 0; i < MIXED * d->n_points; i++) target[i] = 0;
   for (PetscInt i = 0; i < d->n_points; i++) {
-    const PetscReal *y = d->y + (size_t)i * (size_t)d->n_rows;
-
     for (PetscInt r = 0; r < d->n_rows && !Held(i); r++) {
-      if (d->scale[d->group[r]] == 0) continue;
+      if (ScaleOf(d, r) == 0) continue;
       for (PetscInt c = 0; c < MIXED; c++) {
         /* Irregular weights: no row cancels in all combinations. The cost of a choice is then that of MIXED rows,
            not of all. */
         const PetscReal share = (r + 1) * (0.61803398874989485 + 0.075 * c);
 
-        target[c * d->n_points + i] += (share - PetscFloorReal(share) - 0.5) * y[r] / d->scale[d->group[r]];
+        target[c * d->n_points + i] += (share - PetscFloorReal(share) - 0.5) * Y(d, i, r) / ScaleOf(d, r);
       }
     }
   }
@@ -357,150 +353,128 @@ static PetscErrorCode Choose(const HycoFitData *d, PetscInt *n, HycoFunction f[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Least squares at the fitted points: coefficient (n_rows x n), and the error at the others. */
-static PetscErrorCode Solve(const HycoFitData *d, PetscInt n, const PetscReal value[], HycoExportFit *fit)
+/* Least squares at the fitted points: the coefficients and sizes of fit's functions, and the error at the others. */
+static PetscErrorCode Solve(const HycoFitData *d, const PetscReal value[], HycoExportFit *fit)
 {
-  const PetscInt N = d->n_points;
-  PetscReal *A, *P, *scale, *left;
+  const PetscInt N = d->n_points, n = fit->n;
+  PetscReal *A, *P, *left;
   PetscInt *at, m = 0;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc4((size_t)n * (size_t)N, &A, (size_t)n * (size_t)N, &P, n, &scale, N, &at));
+  HycoFreeAll(&fit->coefficient, &fit->size);
+  PetscCall(PetscCalloc1((size_t)n * (size_t)d->n_rows + 1, &fit->coefficient));
+  PetscCall(PetscCalloc1(n + 1, &fit->size));
+  PetscCall(PetscMalloc4((size_t)n * (size_t)N, &A, (size_t)n * (size_t)N, &P, N, &left, N, &at));
   for (PetscInt i = 0; i < N; i++) {
     if (!Held(i)) at[m++] = i;
   }
   for (PetscInt k = 0; k < n; k++) {
-    scale[k] = 0;
-    for (PetscInt i = 0; i < N; i++)
-      scale[k] = PetscMax(scale[k], PetscAbsReal(value[(size_t)k * (size_t)N + (size_t)i]));
-    for (PetscInt i = 0; i < m; i++) A[k * m + i] = value[(size_t)k * (size_t)N + (size_t)at[i]] / scale[k];
+    const PetscReal *v = value + (size_t)k * (size_t)N;
+
+    for (PetscInt i = 0; i < N; i++) fit->size[k] = PetscMax(fit->size[k], PetscAbsReal(v[i]));
+    for (PetscInt i = 0; i < m; i++) A[k * m + i] = v[at[i]] / fit->size[k];
   }
   PetscCall(HycoPseudoInverse(m, n, A, 1e-14, P)); /* n x m by columns */
-  PetscCall(PetscArrayzero(fit->coefficient, (size_t)n * (size_t)d->n_rows));
-  PetscCall(PetscMalloc1(m + 1, &left));
-  for (PetscInt r = 0; r < d->n_rows * PASSES; r++) {
-    PetscReal *c = fit->coefficient + (size_t)(r / PASSES) * (size_t)n;
+  fit->worst = 0;
+  fit->worst_row = d->row[0];
+  for (PetscInt r = 0; r < d->n_rows; r++) {
+    PetscReal *c = fit->coefficient + r;
+    const size_t next = (size_t)d->n_rows;
 
     /* Refined: a product with a pseudo-inverse loses the digits of its condition. */
-    for (PetscInt i = 0; i < m; i++) {
-      left[i] = d->y[(size_t)at[i] * (size_t)d->n_rows + (size_t)(r / PASSES)];
-      for (PetscInt k = 0; k < n; k++) left[i] -= c[k] * A[k * m + i];
+    for (PetscInt pass = 0; pass < PASSES; pass++) {
+      for (PetscInt i = 0; i < m; i++) {
+        left[i] = Y(d, at[i], r);
+        for (PetscInt k = 0; k < n; k++) left[i] -= c[(size_t)k * next] * A[k * m + i];
+      }
+      for (PetscInt i = 0; i < m; i++) {
+        for (PetscInt k = 0; k < n; k++) c[(size_t)k * next] += P[i * n + k] * left[i];
+      }
     }
-    for (PetscInt i = 0; i < m; i++) {
-      for (PetscInt k = 0; k < n; k++) c[k] += P[i * n + k] * left[i];
-    }
-  }
-  PetscCall(PetscFree(left));
-  for (PetscInt r = 0; r < d->n_rows; r++) {
-    for (PetscInt k = 0; k < n; k++) fit->coefficient[(size_t)r * (size_t)n + (size_t)k] /= scale[k];
-  }
-  fit->worst = 0;
-  fit->worst_row = 0;
-  for (PetscInt i = 0; i < N; i++) {
-    for (PetscInt r = 0; Held(i) && r < d->n_rows; r++) {
-      PetscReal error = -d->y[(size_t)i * (size_t)d->n_rows + (size_t)r];
+    for (PetscInt k = 0; k < n; k++) c[(size_t)k * next] /= fit->size[k];
+    for (PetscInt i = 2; i < N; i += 3) { /* Held() */
+      PetscReal error = -Y(d, i, r);
 
-      for (PetscInt k = 0; k < n; k++)
-        error += fit->coefficient[(size_t)r * (size_t)n + (size_t)k] * value[(size_t)k * (size_t)N + (size_t)i];
+      for (PetscInt k = 0; k < n; k++) error += c[(size_t)k * next] * value[(size_t)k * (size_t)N + (size_t)i];
       /* Also where the scale is 0 and the error, too; otherwise the division gives infinity, which is refused. */
-      if (PetscAbsReal(error) <= fit->worst * d->scale[d->group[r]]) continue;
-      fit->worst = PetscAbsReal(error) / d->scale[d->group[r]];
-      fit->worst_row = r;
+      if (PetscAbsReal(error) <= fit->worst * ScaleOf(d, r)) continue;
+      fit->worst = PetscAbsReal(error) / ScaleOf(d, r);
+      fit->worst_row = d->row[r];
     }
   }
-  PetscCall(PetscFree4(A, P, scale, at));
+  PetscCall(PetscFree4(A, P, left, at));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The functions whose largest part of any row exceeds a share of the row's group; n: their number. */
-static PetscErrorCode Prune(const HycoFitData *d, const HycoExportFit *fit, PetscReal share, const PetscReal value[],
-                            PetscInt *n, PetscInt keep[])
+PetscErrorCode HycoExportFitFree(HycoExportFit *fit)
 {
-  PetscReal *part;
-
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(fit->n, &part));
-  *n = 0;
-  for (PetscInt k = 0; k < fit->n; k++) {
-    PetscReal size = 0;
-
-    for (PetscInt i = 0; i < d->n_points; i++)
-      size = PetscMax(size, PetscAbsReal(value[(size_t)k * (size_t)d->n_points + (size_t)i]));
-    for (PetscInt r = 0; r < d->n_rows; r++) {
-      const PetscReal here = size * PetscAbsReal(fit->coefficient[(size_t)r * (size_t)fit->n + (size_t)k]);
-
-      if (d->scale[d->group[r]] > 0) part[k] = PetscMax(part[k], here / d->scale[d->group[r]]);
-    }
-    if (part[k] > share) keep[(*n)++] = k;
-  }
-  PetscCall(PetscFree(part));
+  HycoFreeAll(&fit->function, &fit->coefficient, &fit->size);
+  *fit = (HycoExportFit){0};
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Leaves out the functions that are round-off, as long as the fit is as good. */
-static PetscErrorCode Reduce(const HycoFitData *d, PetscReal tol, PetscReal value[], HycoExportFit *fit)
+/* Leaves out the functions whose part of each row is below a share of the row's group, round-off, as long as the fit is as
+   good. */
+static PetscErrorCode Reduce(const HycoFitData *d, PetscReal tol, const PetscReal value[], HycoExportFit *fit)
 {
-  static const PetscReal share[] = {1e-6, 1e-9, 1e-12};
-  PetscInt *keep;
   PetscReal *less;
-  HycoExportFit trial;
+  HycoExportFit part = {0};
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(fit->n, &keep, (size_t)fit->n * (size_t)d->n_points, &less));
-  for (size_t j = 0; j < sizeof(share) / sizeof(share[0]); j++) {
-    trial = *fit;
-    PetscCall(Prune(d, fit, share[j], value, &trial.n, keep));
-    PetscCall(PetscMalloc1((size_t)trial.n * (size_t)d->n_rows + 1, &trial.coefficient));
-    for (PetscInt k = 0; k < trial.n; k++)
-      PetscCall(PetscArraycpy(less + (size_t)k * (size_t)d->n_points, value + (size_t)keep[k] * (size_t)d->n_points,
+  PetscCall(PetscMalloc1((size_t)fit->n * (size_t)d->n_points, &less));
+  for (PetscReal share = 1e-6; share > 1e-13; share *= 1e-3) {
+    PetscCall(HycoExportFitFree(&part));
+    PetscCall(PetscMalloc1(fit->n, &part.function));
+    for (PetscInt k = 0; k < fit->n; k++) {
+      PetscReal most = 0;
+
+      for (PetscInt r = 0; r < d->n_rows; r++) {
+        const PetscReal here = fit->size[k] * PetscAbsReal(fit->coefficient[(size_t)k * (size_t)d->n_rows + (size_t)r]);
+
+        if (ScaleOf(d, r) > 0) most = PetscMax(most, here / ScaleOf(d, r));
+      }
+      if (most <= share) continue;
+      PetscCall(PetscArraycpy(less + (size_t)part.n * (size_t)d->n_points, value + (size_t)k * (size_t)d->n_points,
                               d->n_points));
-    if (trial.n) PetscCall(Solve(d, trial.n, less, &trial));
-    if (trial.n && trial.worst <= tol) {
-      /* In place (fit's own array): keep ascends. */
-      for (PetscInt k = 0; k < trial.n; k++) trial.function[k] = trial.function[keep[k]];
-      PetscCall(PetscFree(fit->coefficient));
-      *fit = trial;
-      break;
+      part.function[part.n++] = fit->function[k];
     }
-    PetscCall(PetscFree(trial.coefficient));
+    if (part.n) PetscCall(Solve(d, less, &part));
+    if (!part.n || part.worst > tol) continue;
+    PetscCall(HycoExportFitFree(fit));
+    *fit = part;
+    part = (HycoExportFit){0};
+    break;
   }
-  PetscCall(PetscFree2(keep, less));
+  PetscCall(HycoExportFitFree(&part));
+  PetscCall(PetscFree(less));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Both arrays are the caller's, also when worst > tol. */
-PetscErrorCode HycoFitFunctions(const HycoAtoms *atoms, PetscInt level, PetscInt n_seeds, const HycoFunction seed[],
-                                PetscReal tol, const HycoFitData *d, HycoExportFit *fit)
+/* The arrays are the caller's, also when worst > tol. */
+PetscErrorCode HycoFitFunctions(const HycoAtoms *atoms, PetscInt level, PetscBool together, PetscInt n_seeds,
+                                const HycoFunction seed[], PetscReal tol, const HycoFitData *d, HycoExportFit *fit)
 {
   const HycoAtom *atom = atoms->atom;
-  const PetscInt n_atoms = atoms->n, most = level < 0 ? FromSeeds(n_atoms, atom, -2 - level, n_seeds, seed, NULL)
-                                                      : Candidates(n_atoms, atom, level, NULL);
+  const PetscInt most =
+      level < 0 ? FromSeeds(atoms->n, atom, -2 - level, n_seeds, seed, NULL) : Candidates(atoms->n, atom, level, NULL);
   PetscReal *value;
 
   PetscFunctionBegin;
-  fit->n = 0;
+  PetscCall(HycoExportFitFree(fit));
   fit->worst = PETSC_MAX_REAL;
   if (most < 1 || most > MANY) PetscFunctionReturn(PETSC_SUCCESS);
+  fit->n = most;
   PetscCall(PetscMalloc1(most, &fit->function));
   PetscCall(PetscMalloc1((size_t)most * (size_t)d->n_points, &value));
-  /* Chosen one by one; these may miss some that depend nearly on others: then all together, if they are few. */
-  for (PetscInt pass = 0; pass < 2 && fit->worst > tol; pass++) {
-    fit->n = most;
-    if (level < 0)
-      (void)FromSeeds(n_atoms, atom, -2 - level, n_seeds, seed, fit->function);
-    else
-      (void)Candidates(n_atoms, atom, level, fit->function);
-    Tabulate(n_atoms, d, fit->n, fit->function, value);
-    PetscCall(Clean(d->n_points, &fit->n, fit->function, value));
-    if (pass && fit->n > d->n_points / 2) {
-      fit->n = 0;
-      break;
-    }
-    if (!pass) PetscCall(Choose(d, &fit->n, fit->function, value));
-    PetscCall(PetscFree(fit->coefficient));
-    PetscCall(PetscMalloc1((size_t)fit->n * (size_t)d->n_rows + 1, &fit->coefficient));
-    PetscCall(Solve(d, fit->n, value, fit));
-  }
+  if (level < 0)
+    (void)FromSeeds(atoms->n, atom, -2 - level, n_seeds, seed, fit->function);
+  else
+    (void)Candidates(atoms->n, atom, level, fit->function);
+  Tabulate(d, &fit->n, fit->function, value);
+  if (together && fit->n > d->n_points / 2) fit->n = 0;
+  if (!together) PetscCall(Choose(d, &fit->n, fit->function, value));
+  if (fit->n) PetscCall(Solve(d, value, fit));
   if (fit->worst <= tol) PetscCall(Reduce(d, tol, value, fit));
   PetscCall(PetscFree(value));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -85,6 +85,7 @@ static void set_scales(const Model *m, Work *o)
   const int p = m->n_motions, n = m->n_contacts;
   double most = 0;
 
+  make_columns(m, o, 1);
   for (int i = 0; i < p; i++) {
     o->rho[i] = 0;
     for (int j = 0; j < n; j++) o->rho[i] = fmax(o->rho[i], fabs(o->A[(size_t)i * (size_t)n + (size_t)j]));
@@ -122,22 +123,6 @@ static double measure(const Model *m, Work *o, const double z[], const double w[
   return sqrt(sum);
 }
 
-/* Whether a force at row i, or a motion, moves it, of those of its block. */
-static int flexible(const Model *m, Work *o, int k, int i)
-{
-  const size_t n = (size_t)m->n_contacts;
-  double most = 0, own = 0;
-
-  for (int r = m->row[k]; r < m->row[k + 1]; r++) {
-    double moves = column(m, o, (size_t)r)[r];
-
-    for (size_t c = 0; c < (size_t)m->n_motions; c++) moves = fmax(moves, fabs(o->A[c * n + (size_t)r]));
-    most = fmax(most, moves);
-    if (r == i) own = moves;
-  }
-  return own > 1e-12 * most;
-}
-
 /* The unknowns on the pieces of P at y (stick: all contacts stick): rows of DP, o->D by block, that are not 0; `aimed` is z
    with 0 in the others. Returns their number. */
 static int find_unknowns(const Model *m, Work *o, const double z[], int stick)
@@ -155,14 +140,12 @@ static int find_unknowns(const Model *m, Work *o, const double z[], int stick)
     law(m, o, k, data);
     HycoCoulombDerivative(rows, data, o->from + p + first, D);
     for (int i = 0; i < rows; i++) {
-      const int held = i && !flexible(m, o, k, first + i);
       double size = 0;
 
       for (int j = 0; j < rows; j++) {
         if (stick) D[rows * i + j] = i == j;
-        if (held) D[rows * i + j] = D[rows * j + i] = 0;
+        size += fabs(D[rows * i + j]);
       }
-      for (int j = 0; j < rows; j++) size += fabs(D[rows * i + j]);
       if (size > 0)
         o->unknown[count++] = p + first + i;
       else

@@ -21,7 +21,7 @@ typedef struct {
   double *W, *A, *L, *V, *S, *last, *y;
   double pin; /* of A^T (q_x + A L), which is 0, in w_L: a body's pins have no flexibility of their own */
   double *at_places, *push, *sum; /* n_motions + n_places: w for z = 0, z; n_terms */
-  int *closed, *at, *made,
+  int *closed, *at, *list, *made,
       n_closed;          /* by contact: 0, open; 2, one of the next; the closed ones, rows of L; of W's columns */
   Met *met;              /* by contact; of moved surfaces, like */
   int *touched, *before; /* places of moved surfaces that rows have; by place: how many of these precede it */
@@ -55,7 +55,7 @@ static size_t work_size(const Model *m)
       nodes ? n * sizeof(Met) + facets * sizeof(HycoPoint) + (size_t)HycoPatchesBoxes(s->n_facets) * sizeof(HycoBox)
             : 0;
 
-  return doubles * sizeof(double) + moved + (3 * n + 2 * places + 1 + path_ints(m)) * sizeof(int);
+  return doubles * sizeof(double) + moved + (4 * n + 2 * places + 1 + path_ints(m)) * sizeof(int);
 }
 
 static double *take(double **from, size_t n)
@@ -102,7 +102,8 @@ static void place(const Model *m, void *memory, Work *o)
   }
   o->closed = (int *)(void *)next;
   o->at = o->closed + n;
-  o->made = o->at + n;
+  o->list = o->at + n;
+  o->made = o->list + n;
   o->touched = o->made + n;
   o->before = o->touched + places;
   o->unknown = o->before + places + 1;
@@ -123,9 +124,14 @@ static double dot(size_t n, const double a[], const double b[])
 }
 
 /* to += factor from. */
-static void add(size_t n, double factor, const double from[], double to[])
+static void add(size_t n, double factor, const double *restrict from, double *restrict to)
 {
-  for (size_t i = 0; i < n; i++) to[i] += factor * from[i];
+  size_t i = 0;
+
+  for (; i + 4 <= n; i += 4) {
+    for (size_t k = 0; k < 4; k++) to[i + k] += factor * from[i + k];
+  }
+  for (; i < n; i++) to[i] += factor * from[i];
 }
 
 /* W of contact a by those at places: y = the sum of C_b B_b^T over the bodies, then B y. */
@@ -153,23 +159,35 @@ static void fill_moved(const Model *m, const Work *o, const Met *a, double y[], 
   }
 }
 
-/* W of contact a with all; made when it is needed first. */
-static const double *column(const Model *m, Work *o, size_t a)
+/* W with all contacts of those that are closed, or of all. Where rows are fixed the triangles are read in the order of memory. */
+static void make_columns(const Model *m, Work *o, int all)
 {
   const size_t n = (size_t)m->n_contacts, size = n * (n + 1) / 2;
-  double *w = o->W + a * n;
+  int k = 0, done = 0;
 
-  if (o->made[a]) return w;
-  o->made[a] = 1;
-  memset(w, 0, n * sizeof(double));
-  if (m->surfaces.n_nodes) fill_moved(m, o, &o->met[a], o->push + m->n_motions, w);
-  for (size_t s = 0; s < (size_t)m->n_stiffness && !m->surfaces.n_nodes; s++) {
-    const double factor = o->f[m->stiffness[s]], *W = m->W + s * size;
-
-    add(a + 1, factor, W + a * (a + 1) / 2, w);
-    for (size_t i = a + 1; i < n; i++) w[i] += factor * W[i * (i + 1) / 2 + a];
+  for (int i = 0; i < m->n_contacts; i++) {
+    if (o->made[i] || !(all || o->closed[i])) continue;
+    o->made[i] = 1;
+    o->list[k++] = i;
+    if (m->surfaces.n_nodes) fill_moved(m, o, &o->met[i], o->push + m->n_motions, o->W + (size_t)i * n);
   }
-  return w;
+  for (size_t i = 0; i < n && k && !m->surfaces.n_nodes; i++) {
+    const int is = done < k && (size_t)o->list[done] == i;
+
+    done += is;
+    if (!done) continue;
+    memset(o->y, 0, (i + 1) * sizeof(double));
+    for (size_t s = 0; s < (size_t)m->n_stiffness; s++)
+      add(i + 1, o->f[m->stiffness[s]], m->W + s * size + i * (i + 1) / 2, o->y);
+    for (int j = 0; j < done; j++) o->W[(size_t)o->list[j] * n + i] = o->y[o->list[j]];
+    if (is) memcpy(o->W + i * n, o->y, i * sizeof(double));
+  }
+}
+
+/* W of contact a with all, which is made. */
+static const double *column(const Model *m, const Work *o, size_t a)
+{
+  return o->W + a * (size_t)m->n_contacts;
 }
 
 /* The places that contacts touch. */
@@ -324,6 +342,7 @@ static size_t arrange(const Model *m, Work *o)
   size_t same = (size_t)o->n_closed;
   int k = 0;
 
+  make_columns(m, o, 0);
   for (int i = 0; i < o->n_closed; i++) {
     if (o->closed[o->at[i]])
       o->at[k++] = o->at[i];
@@ -515,6 +534,7 @@ static double search_held(const Model *m, Work *o, int *iterations)
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
   double epsilon = 0, delta = 0, kkt = HUGE_VAL;
 
+  make_columns(m, o, 1);
   for (size_t i = 0; i < n; i++) delta = fmax(delta, 1e-8 * column(m, o, i)[i]);
   for (size_t i = 0; i < p * n; i++) epsilon = fmax(epsilon, 1e-2 * o->A[i] * o->A[i] * (1e-8 / delta));
   start(m, o);
