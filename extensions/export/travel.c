@@ -335,13 +335,39 @@ static PetscErrorCode Make(HycoTravel t, HycoExportModel *out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether parameters move a surface whose masters are searched for: a map without any only places it. */
+static PetscErrorCode Travels(HycoROM m, PetscBool *travels)
+{
+  const HycoScene s = m->model->scene;
+  const HycoMesh mesh = m->fe->mesh;
+  PetscBool all[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  *travels = PETSC_FALSE;
+  for (PetscInt p = 0; p < HYCO_MAX_PARAMETERS; p++) all[p] = PETSC_TRUE;
+  for (PetscInt c = 0; c < 2 * s->n_contacts; c++) {
+    PetscInt g = 0;
+
+    if (!HycoPairsFollows(&m->pairs, c / 2)) continue;
+    PetscCall(HycoMeshFindGroup(mesh, "contact", c % 2 ? s->contact[c / 2]->master : s->contact[c / 2]->slave, &g));
+    for (PetscInt k = 0; k < 3 * mesh->n_facets; k++) {
+      const HycoExpr map = s->body[mesh->node_body[mesh->facets[k / 3 * mesh->nf]]].map[k % 3];
+
+      *travels = (PetscBool)(*travels || (mesh->facet_group[k / 3] == g && HycoExprChanges(map, all)));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoTravelCreate(HycoROM m, HycoExportModel *out, HycoTravel *travel)
 {
   HycoTravel t;
+  PetscBool travels;
 
   PetscFunctionBegin;
   *travel = NULL;
-  if (!m->pairs.room) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Travels(m, &travels));
+  if (!travels) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&t));
   t->m = m;
   *travel = t;

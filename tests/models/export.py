@@ -44,7 +44,7 @@ parameter: {press: {range: [0.01, 0.05]}, lift: {range: [0, 0.02]}, soft: {range
 constant: {half: 4^-2^-1, pressure: "min(half, half*weight^2, 2) - -2^2*1e-2*(weight > 0.5 && rint(weight) == 1 ? exp(-weight) : log10(1 + weight))"}
 body:
   plate: {young: "soft < 1.5 ? 500*soft : 10^(soft + 1)", poisson: 0.3}
-  pad: {young: 100, poisson: 0.3}
+  pad: {young: 100, poisson: 0.3, map: {x: 1.1*x + 0.1, y: 0.9*y, z: z}}
 fixed: {base: {x: 0, y: 0, z: 0}, press: {x: 0, y: 0, z: -press}}
 pressure: {side: pressure}
 contact: {under: {type: surface, slave: sole, master: top, gap: "lift + 0.01*(x^2 + y^2)"}}
@@ -313,7 +313,7 @@ class Export(Case):
         self.assertNotRegex(subprocess.run(['nm', self.path('floating.o')], capture_output=True, text=True, check=True).stdout, r' [bBC] ')  # no variables
 
     def test_pad(self):
-        """3D: an opening gap, a modulus with a kink, a pressure by a constant of the scene."""
+        """3D: an opening gap under a body that a map without parameters places, a modulus with a kink, a pressure by a constant of the scene."""
         self.drawn('drawn_pad', 3, PAD[1], PAD[0])
         self.judge('pad', self.path('drawn_pad'), ['stress', 'push', 'mean', 'area'])
 
