@@ -27,7 +27,7 @@
 #define PATHS_CHECKED  8 /* or so many paths */
 #define PATH_TOLERANCE 1e-8
 #define HELD_ROW       1e-12 /* of what a force at a tangent moves, beside its block */
-#define ROUNDING       1e-14 /* of a coefficient beside others */
+#define ROUNDING       1e-12 /* of a coefficient beside others */
 #define SAMPLES        120   /* points for the functions, of which a third checks them; more with weights of samples: */
 #define SEVERAL        20    /* samples: with more, products are tried of known functions alone */
 #define EACH           8     /* for each */

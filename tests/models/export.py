@@ -241,13 +241,13 @@ class Export(Case):
         names, *rows = run.stdout.splitlines()
         return names.split(), np.array([[float(v) for v in row.split()] for row in rows])
 
-    def judge(self, name, scene, outputs):
+    def judge(self, name, scene, outputs, level='-O0'):
         """The program of a model of the scene against predict, at 64 points with corners and faces; its outputs begin with those of the scene."""
         self.hyco('train', '-scene', scene, '-hyco_model_type', 'bodies', '-scatter', '2', '-model', name + '.h5')
         said = self.run_raw('export', '-model', name + '.h5', '-c', name + '.c')
         self.assertEqual((said.returncode, said.stderr), (0, ''))
         self.run_raw('predict', '-model', name + '.h5', '-scatter', '64', '-table', 't.h5')
-        self.compiled(name)
+        self.compiled(name, level=level)
         with h5py.File(self.path('t.h5')) as t:
             table = {key: np.array(t[key]) for key in t}
         with open(self.path(name + '.h'), encoding='ascii') as f:
@@ -301,7 +301,7 @@ class Export(Case):
         with open(self.path('float.yaml'), 'w', encoding='ascii') as f:
             f.write(FLOATING)
         points, names = self.judge('floating', self.path('float.yaml'),
-                                   ['peak', 'sink', 'corner', 'spread', 'base', 'turn', 'most', 'least', 'tension', 'hoop'])
+                                   ['peak', 'sink', 'corner', 'spread', 'base', 'turn', 'most', 'least', 'tension', 'hoop'], '-O1')
         mu = points[0].copy()
         for value, status in ((2, 0), (4.001, 1), (float('nan'), 2), (float('inf'), 2)):
             mu[0] = value
@@ -364,17 +364,19 @@ class Export(Case):
             self.assertFalse([f for f in os.listdir(self.folder) if f.startswith('no.')])
 
     def test_existing(self):
-        """A file of another origin is not overwritten, neither FILE.c nor FILE.h; own ones are."""
-        self.hyco('train', '-scene', os.path.join(SOURCE, 'examples', 'roller'), '-hyco_model_type', 'bodies', '-scatter', '2', '-model', 'roller.h5')
+        """A file of another origin is not overwritten, neither FILE.c nor FILE.h; own ones are. A gap that a parameter closes just so presses nothing without loads."""
+        self.hyco('train', '-scene', os.path.join(SOURCE, 'examples', 'pellet'), '-hyco_model_type', 'bodies', '-scatter', '2', '-hyco_validation', '0', '-model', 'pellet.h5')
         for name in ('mine.h', 'mine.c'):
             with open(self.path(name), 'w', encoding='ascii') as f:
                 f.write('int mine;\n')
-            run = self.run_raw('export', '-model', 'roller.h5', '-c', 'mine.c')
+            run = self.run_raw('export', '-model', 'pellet.h5', '-c', 'mine.c')
             self.assertEqual((run.returncode, len(run.stderr.strip().splitlines())), (1, 1), run.stderr)
             self.assertIn(name, run.stderr)
             with open(self.path(name), encoding='ascii') as f:
                 self.assertEqual(f.read(), 'int mine;\n')
             os.remove(self.path(name))
+        for _ in range(2):
+            self.assertEqual(self.run_raw('export', '-model', 'pellet.h5', '-c', 'mine.c').stderr, '')
 
 
 if __name__ == '__main__':
