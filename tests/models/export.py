@@ -267,6 +267,12 @@ class Export(Case):
         self.assertLess(closed.min(), closed.max())  # the set of closed contacts changes over the points
         return points, names
 
+    def difference(self, name):
+        """That of the program of NAME.h5 from the model, as the export says."""
+        run = self.run_raw('export', '-model', name + '.h5', '-c', name + '.c')
+        self.assertEqual(run.returncode, 0, run.stderr)
+        return float(run.stdout.split('largest difference from the model ')[1].split()[0])
+
     def judge_path(self, name, scene, points, level='-O0'):
         """The program of a model of paths against predict at each listed time, beside corners of the ranges; returns the outputs by name."""
         with open(self.path(name + '.yaml'), 'w', encoding='ascii') as f:
@@ -335,15 +341,23 @@ class Export(Case):
         """2D: the radius of a tool that travels over a plate, to beyond its edge, whose end is drawn aside: flexibilities between samples, moved normals and areas."""
         self.drawn('drawn_shape', 2, SHAPE[1], SHAPE[0])
         self.judge('shape', self.path('drawn_shape'), ['force', 'hold', 'most', 'stress', 'sink', 'touch'])
+        # two parameters of its shape, under a load
+        scene = SHAPE[0]
+        for old, new in (('push]', 'push, tall]'), ('radius: {range: [3, 6]}', 'radius: {range: [5, 6]}, tall: {range: [1, 1.1]}'), ('"y + x^2', '"y*tall + x^2'),
+                         (', y: -push}}', '}}\npressure: {grip: 100*push}'), ('reaction: y, group: grip', 'reaction: x, group: grip')):
+            self.assertIn(old, scene)
+            scene = scene.replace(old, new)
+        with open(self.path('drawn_shape', 'two.yaml'), 'w', encoding='ascii') as f:
+            f.write(scene)
+        self.hyco('train', '-scene', self.path('drawn_shape', 'two.yaml'), '-hyco_model_type', 'bodies', '-scatter', '2', '-hyco_validation', '0', '-model', 'two.h5')
+        self.assertLess(self.difference('two'), 1e-9)
 
     def test_displaced(self):
         """Four parameters of given displacements that vary in space on a body that turns by a small angle: found whatever the number of expressions."""
         with open(self.path('displaced.yaml'), 'w', encoding='ascii') as f:
             f.write(DISPLACED)
         self.hyco('train', '-scene', 'displaced.yaml', '-hyco_model_type', 'bodies', '-scatter', '12', '-hyco_validation', '0', '-model', 'displaced.h5')
-        run = self.run_raw('export', '-model', 'displaced.h5', '-c', 'displaced.c')
-        self.assertEqual(run.returncode, 0, run.stderr)
-        self.assertLess(float(run.stdout.split('largest difference from the model ')[1].split()[0]), 1e-11)
+        self.assertLess(self.difference('displaced'), 1e-11)
 
     def test_refused(self):
         """One line names what cannot be exported, and no file is written."""
