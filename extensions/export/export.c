@@ -160,29 +160,9 @@ static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[]
 
 /* -- the outputs -- */
 
-static PetscErrorCode AddRow(Export *e, Row row)
-{
-  PetscFunctionBegin;
-  HYCO_ADD(e->n_rows, e->row, row);
-  e->n_rows++;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode AddContact(Export *e, PetscInt contact)
-{
-  PetscFunctionBegin;
-  HYCO_ADD(e->out.n_contact, e->out.m.contact, (int)contact);
-  e->out.n_contact++;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode AddWeight(Export *e, PetscReal weight)
-{
-  PetscFunctionBegin;
-  HYCO_ADD(e->out.n_weights, e->out.m.weight, weight);
-  e->out.n_weights++;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+#define ADD_ROW(e, ...)    HYCO_APPEND((e)->n_rows, (e)->row, __VA_ARGS__)
+#define ADD_CONTACT(e, k)  HYCO_APPEND((e)->out.n_contact, (e)->out.m.contact, (int)(k))
+#define ADD_WEIGHT(e, one) HYCO_APPEND((e)->out.n_weights, (e)->out.m.weight, one)
 
 /* Copies the names. */
 static PetscErrorCode AddOutput(HycoExportModel *m, Output output, const char name[], const char unit[])
@@ -256,7 +236,7 @@ static PetscErrorCode AddItems(Export *e, PetscInt quantity, Output *o)
         "smaller group",
         q->name, MOST_ITEMS);
     o->n++;
-    if (q->kind == HYCO_QUANTITY_MEAN) PetscCall(AddWeight(e, weight));
+    if (q->kind == HYCO_QUANTITY_MEAN) ADD_WEIGHT(e, weight);
     o->width = o->of == COMPONENT ? 1 : each;
     for (PetscInt d = 0; d < (o->of == COMPONENT ? 1 : each); d++) {
       for (PetscInt j = 0; j < 6; j++) row.coefficient[j] = j == d;
@@ -268,7 +248,7 @@ static PetscErrorCode AddItems(Export *e, PetscInt quantity, Output *o)
         /* A component along a direction is linear in those of the stress: its coefficients by unit stresses. */
         row.coefficient[j] = c[j] / weight;
       }
-      PetscCall(AddRow(e, row));
+      ADD_ROW(e, row);
     }
   }
   PetscCall(PetscFree2(u, sigma));
@@ -290,7 +270,7 @@ static PetscErrorCode AddContacts(Export *e, const HycoQuantity *q, Output *o)
 
     while (!e->travel && at < e->k && e->contact[at] != (e->first ? e->first[k] : k)) at++;
     if (!of[k] || (at == e->k && o->kind != PRESSURE_SMALLEST)) continue;
-    PetscCall(AddContact(e, at < e->k ? at : -1));
+    ADD_CONTACT(e, at < e->k ? at : -1);
     o->n++;
   }
   PetscCall(PetscFree(of));
@@ -306,7 +286,7 @@ static PetscErrorCode AddForces(Export *e, const HycoQuantity *q, Output *o)
   *o = (Output){.kind = RESULTANT, .of = (int)q->field + (q->kind == HYCO_QUANTITY_MOMENT ? 3 : 0), .width = -1};
   PetscCall(AddContacts(e, q, o));
   o->weight = e->out.n_weights;
-  for (PetscInt k = 0; k < o->n + e->out.m.surfaces.n_nodes; k++) PetscCall(AddWeight(e, k < o->n && !none ? -1 : 0));
+  for (PetscInt k = 0; k < o->n + e->out.m.surfaces.n_nodes; k++) ADD_WEIGHT(e, k < o->n && !none ? -1 : 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -322,10 +302,10 @@ static PetscErrorCode AddPush(Export *e, const PetscBool of[], PetscInt axis, Ou
       .kind = RESULTANT, .of = (int)axis, .width = o->first, .first = e->out.n_contact, .weight = e->out.n_weights};
   o->n = pairs->n;
   for (PetscInt k = 0; k < pairs->n; k++) {
-    PetscCall(AddContact(e, k));
-    PetscCall(AddWeight(e, of[body[pairs->slave[k]]]));
+    ADD_CONTACT(e, k);
+    ADD_WEIGHT(e, of[body[pairs->slave[k]]]);
   }
-  for (PetscInt i = 0; i < e->out.m.surfaces.n_nodes; i++) PetscCall(AddWeight(e, of[e->out.m.surfaces.body[i]]));
+  for (PetscInt i = 0; i < e->out.m.surfaces.n_nodes; i++) ADD_WEIGHT(e, of[e->out.m.surfaces.body[i]]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -342,7 +322,7 @@ static PetscErrorCode AddWork(Export *e, const HycoQuantity *q, Output *o)
   for (PetscInt b = 0, k = 0; b < e->out.m.n_slip; b++) {
     while (e->first[k] != e->contact[e->out.m.row[b]]) k++;
     if (!of[k]) continue;
-    PetscCall(AddContact(e, b));
+    ADD_CONTACT(e, b);
     o->n++;
   }
   PetscCall(PetscFree(of));
@@ -378,7 +358,7 @@ static PetscErrorCode AddQuantity(Export *e, PetscInt k)
     const PetscBool *pushed = e->travel ? HycoROMGetPushed(e->m, k) : NULL;
 
     o.n = 1;
-    PetscCall(AddRow(e, (Row){.from = QUANTITY, .index = k, .group = e->out.m.n_outputs}));
+    ADD_ROW(e, (Row){.from = QUANTITY, .index = k, .group = e->out.m.n_outputs});
     if (pushed) PetscCall(AddPush(e, pushed, q->field, &o));
   }
   PetscCall(AddOutput(&e->out, o, q->name, HycoExportUnit(e->s, q)));
@@ -397,7 +377,7 @@ static PetscErrorCode FindOutputs(Export *e)
   e->out.m.areas = (int)e->n_rows;
   for (PetscInt i = 0, k = 0; i < e->k && !e->travel; i++) {
     while (k + 1 < e->m->pairs.n && (e->first ? e->first[k + 1] : k + 1) <= e->contact[i]) k++;
-    PetscCall(AddRow(e, (Row){.from = AREA, .index = k, .group = -1}));
+    ADD_ROW(e, (Row){.from = AREA, .index = k, .group = -1});
   }
   for (PetscInt k = 0; k < s->n_quantities; k++) PetscCall(AddQuantity(e, k));
   for (PetscInt c = 0; c < s->n_contacts; c++) {
@@ -409,7 +389,7 @@ static PetscErrorCode FindOutputs(Export *e)
       if (e->travel)
         PetscCall(AddForces(e, &q, &o));
       else
-        PetscCall(AddRow(e, (Row){.from = FORCE, .index = c, .axis = a, .group = e->out.m.n_outputs}));
+        ADD_ROW(e, (Row){.from = FORCE, .index = c, .axis = a, .group = e->out.m.n_outputs});
       HycoFormat(name, "%s.force_%c", s->contact[c]->name, "xyz"[a]);
       PetscCall(AddOutput(&e->out, o, name, HycoExportUnit(s, &q)));
     }
@@ -1132,19 +1112,6 @@ static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode CompareHere(Export *e)
-{
-  const Model *model = &e->out.m;
-  char *memory;
-
-  PetscFunctionBegin;
-  e->out.n_states = (PetscInt)state_size(model);
-  PetscCall(PetscMalloc1(state_size(model), &e->state));
-  PetscCall(PetscMalloc1(work_size(model) + 1, &memory));
-  HycoFinally(Compare(e, model, memory), PetscCall(PetscFree(memory)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* -- the exporter -- */
 
 /* The ranges of the variables that a path has beside its parameters: the time, and values of tables. */
@@ -1190,14 +1157,13 @@ static PetscErrorCode Prepare(Export *e)
 
     if (k < 0) continue;
     e->out.m.coefficient[b] = (int)e->n_rows;
-    PetscCall(AddRow(e, (Row){.from = COEFFICIENT, .index = k, .group = -1}));
+    ADD_ROW(e, (Row){.from = COEFFICIENT, .index = k, .group = -1});
   }
   for (PetscInt i = 0; e->travel && i < e->travel->n_values; i++) {
     const TravelValue *v = &e->travel->value[i];
 
     /* All entries of a turn are of one size. */
-    PetscCall(AddRow(
-        e, (Row){.from = TRAVEL, .index = i, .group = e->out.m.n_outputs + i - (v->from == TURN ? v->part : 0)}));
+    ADD_ROW(e, (Row){.from = TRAVEL, .index = i, .group = e->out.m.n_outputs + i - (v->from == TURN ? v->part : 0)});
   }
   for (PetscInt i = 0; i < PLACES; i++) /* nodes without regularity */
     PetscCall(PetscArraycpy(x + 3 * i, m->fe->X + 3 * ((i * 7919 + 13) % m->fe->mesh->n_nodes), 3));
@@ -1224,6 +1190,8 @@ static PetscErrorCode Prepare(Export *e)
 /* Nothing is written before the comparison has passed. */
 static PetscErrorCode Build(Export *e)
 {
+  char *memory;
+
   PetscFunctionBegin;
   PetscCall(Prepare(e));
   PetscCall(FitBoth(e, -1, 1));
@@ -1232,7 +1200,10 @@ static PetscErrorCode Build(Export *e)
     PetscCall(FitBoth(e, -1, MORE));
   if (e->base.worst > EXACT || e->response.worst > EXACT) PetscCall(Refuse(e));
   PetscCall(Fill(e));
-  PetscCall(CompareHere(e));
+  e->out.n_states = (PetscInt)state_size(&e->out.m);
+  PetscCall(PetscMalloc1(e->out.n_states, &e->state));
+  PetscCall(PetscMalloc1(work_size(&e->out.m) + 1, &memory));
+  HycoFinally(Compare(e, &e->out.m, memory), PetscCall(PetscFree(memory)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -92,6 +92,11 @@ typedef struct {
     if (!((n) & ((n)-1))) PetscCall(PetscRealloc((size_t)PetscMax(1, 2 * (n)) * sizeof(*(array)), &(array)));          \
     (array)[n] = (__VA_ARGS__);                                                                                        \
   } while (0)
+#define HYCO_APPEND(n, array, ...)                                                                                     \
+  do {                                                                                                                 \
+    HYCO_ADD(n, array, __VA_ARGS__);                                                                                   \
+    (n)++;                                                                                                             \
+  } while (0)
 PetscErrorCode HycoExportModelFree(HycoExportModel *model, HycoScene scene);
 /* The unit of an output of the scene, "" where the scene has none. Borrowed, until the next call. */
 const char *HycoExportUnit(HycoScene scene, const HycoQuantity *quantity);

@@ -15,13 +15,7 @@ PetscErrorCode HycoTravelDestroy(HycoTravel *travel)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode AddValue(HycoTravel t, TravelFrom from, PetscInt index, PetscInt part)
-{
-  PetscFunctionBegin;
-  HYCO_ADD(t->n_values, t->value, (TravelValue){from, index, part});
-  t->n_values++;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+#define ADD_VALUE(t, ...) HYCO_APPEND((t)->n_values, (t)->value, (TravelValue){__VA_ARGS__})
 
 /* Moves the model. */
 static PetscErrorCode Bring(HycoTravel t, const PetscReal mu[])
@@ -263,7 +257,7 @@ static PetscErrorCode FindPlaces(HycoTravel t, const PetscBool moves[], const Pe
   PetscCall(PetscMalloc1(u->n_nodes * u->dim, &u->given));
   PetscCall(PetscMalloc1(u->n_nodes, &u->pose));
   for (PetscInt k = 0; k < b->n; k++) {
-    for (PetscInt term = 0; term < b->body[k].C.n_terms; term++) PetscCall(AddValue(t, FLEXIBLE, k, term));
+    for (PetscInt term = 0; term < b->body[k].C.n_terms; term++) ADD_VALUE(t, FLEXIBLE, k, term);
   }
   for (PetscInt i = 0; i < u->n_nodes; i++) {
     PetscInt body = -1;
@@ -276,7 +270,7 @@ static PetscErrorCode FindPlaces(HycoTravel t, const PetscBool moves[], const Pe
       if (u->place[i * u->dim + c] >= 0) body = HycoBodiesAt(b, at);
       if (!fe->fixed[dof] || !moves[dof]) continue;
       u->given[i * u->dim + c] = (int)t->n_values;
-      PetscCall(AddValue(t, HELD, dof, 0));
+      ADD_VALUE(t, HELD, dof, 0);
     }
     u->pose[i] = body >= 0 && turns[body] ? -2 - (int)body : -1;
   }
@@ -284,7 +278,7 @@ static PetscErrorCode FindPlaces(HycoTravel t, const PetscBool moves[], const Pe
     for (PetscInt i = 0; i < u->n_nodes && turns[k]; i++) {
       if (u->pose[i] == -2 - (int)k) u->pose[i] = (int)t->n_values;
     }
-    for (PetscInt e = 0; e < 9 && turns[k]; e++) PetscCall(AddValue(t, TURN, k, e));
+    for (PetscInt e = 0; e < 9 && turns[k]; e++) ADD_VALUE(t, TURN, k, e);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
