@@ -14,7 +14,6 @@
 #include <string.h>
 #include <time.h>
 
-#define PATHS
 #include "runtime/runtime.c"
 #include <hycocoulomb.h>
 #include "runtime/paths.c"
@@ -27,7 +26,8 @@
 #define MOST_ITEMS     3000
 #define PATHS_CHECKED  8 /* or so many paths */
 #define PATH_TOLERANCE 1e-8
-#define ROUNDING       1e-14 /* of a coefficient beside others */
+#define HELD_ROW       1e-12 /* of what a force at a tangent moves, beside its block */
+#define ROUNDING       1e-12 /* of a coefficient beside others */
 #define SAMPLES        120   /* points for the functions, of which a third checks them; more with weights of samples: */
 #define SEVERAL        20    /* samples: with more, products are tried of known functions alone */
 #define EACH           8     /* for each */
@@ -51,8 +51,8 @@ typedef struct {
   PetscInt *first;            /* with friction rows instead; by contact of the model: its first one; NULL: its number */
   PetscReal *z, *unit;        /* p + n; their sizes */
   PetscReal *w;
-  PetscInt n_atoms, n_rows, room, ny, n_groups, *group;
-  HycoAtom *atom;
+  PetscInt n_rows, ny, n_groups, *group;
+  HycoAtoms atoms;
   Row *row;
   PetscReal *area;     /* by contact of the model; where none travels, values: */
   PetscInt travel_row; /* the first row of the travel's values */
@@ -61,7 +61,6 @@ typedef struct {
   HycoExportFit base, response;
   HycoExportModel out;
   double *state; /* of a path of the program */
-  PetscErrorCode failed;
 } Export;
 
 /* -- probing -- */
@@ -70,7 +69,7 @@ typedef struct {
 static PetscReal Component(const Export *e, const Row *r, const PetscReal u[])
 {
   const PetscInt dim = e->m->model->mesh->dim, node = r->index / dim;
-  const PetscReal *Q = r->turned ? HycoTravelTurn(e->travel, r->turned - 1) : NULL;
+  const PetscReal *Q = r->turned ? e->travel->bodies->pose[r->turned - 1].Q : NULL;
   PetscReal sum = 0;
 
   if (!Q) return u[r->index];
@@ -82,7 +81,7 @@ static PetscReal Component(const Export *e, const Row *r, const PetscReal u[])
 static PetscReal Stress(const Export *e, const Row *r, PetscInt n, const PetscReal sigma[])
 {
   static const PetscInt at[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {0, 2}};
-  const PetscReal *Q = r->turned ? HycoTravelTurn(e->travel, r->turned - 1) : NULL;
+  const PetscReal *Q = r->turned ? e->travel->bodies->pose[r->turned - 1].Q : NULL;
   PetscReal sum = 0;
 
   for (PetscInt k = 0; k < n; k++) {
@@ -161,15 +160,19 @@ static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[]
 
 /* -- the outputs -- */
 
-static PetscErrorCode AddRow(Export *e, Row row)
+#define ADD_ROW(e, ...)    HYCO_APPEND((e)->n_rows, (e)->row, __VA_ARGS__)
+#define ADD_CONTACT(e, k)  HYCO_APPEND((e)->out.n_contact, (e)->out.m.contact, (int)(k))
+#define ADD_WEIGHT(e, one) HYCO_APPEND((e)->out.n_weights, (e)->out.m.weight, one)
+
+/* Copies the names. */
+static PetscErrorCode AddOutput(HycoExportModel *m, Output output, const char name[], const char unit[])
 {
   PetscFunctionBegin;
-  if (e->n_rows == e->room) {
-    /* Rows of one output are contiguous; they only grow. */
-    e->room = 2 * e->room + 64;
-    PetscCall(PetscRealloc((size_t)e->room * sizeof(*e->row), &e->row));
-  }
-  e->row[e->n_rows++] = row;
+  HYCO_ADD(m->m.n_outputs, m->m.output, output);
+  HYCO_ADD(m->m.n_outputs, m->name, NULL);
+  HYCO_ADD(m->m.n_outputs, m->unit, NULL);
+  PetscCall(PetscStrallocpy(name, &m->name[m->m.n_outputs]));
+  PetscCall(PetscStrallocpy(unit, &m->unit[m->m.n_outputs++]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -233,7 +236,7 @@ static PetscErrorCode AddItems(Export *e, PetscInt quantity, Output *o)
         "smaller group",
         q->name, MOST_ITEMS);
     o->n++;
-    if (q->kind == HYCO_QUANTITY_MEAN) PetscCall(HycoExportAddWeight(&e->out, weight));
+    if (q->kind == HYCO_QUANTITY_MEAN) ADD_WEIGHT(e, weight);
     o->width = o->of == COMPONENT ? 1 : each;
     for (PetscInt d = 0; d < (o->of == COMPONENT ? 1 : each); d++) {
       for (PetscInt j = 0; j < 6; j++) row.coefficient[j] = j == d;
@@ -245,7 +248,7 @@ static PetscErrorCode AddItems(Export *e, PetscInt quantity, Output *o)
         /* A component along a direction is linear in those of the stress: its coefficients by unit stresses. */
         row.coefficient[j] = c[j] / weight;
       }
-      PetscCall(AddRow(e, row));
+      ADD_ROW(e, row);
     }
   }
   PetscCall(PetscFree2(u, sigma));
@@ -267,7 +270,7 @@ static PetscErrorCode AddContacts(Export *e, const HycoQuantity *q, Output *o)
 
     while (!e->travel && at < e->k && e->contact[at] != (e->first ? e->first[k] : k)) at++;
     if (!of[k] || (at == e->k && o->kind != PRESSURE_SMALLEST)) continue;
-    PetscCall(HycoExportAddContact(&e->out, at < e->k ? at : -1));
+    ADD_CONTACT(e, at < e->k ? at : -1);
     o->n++;
   }
   PetscCall(PetscFree(of));
@@ -283,8 +286,7 @@ static PetscErrorCode AddForces(Export *e, const HycoQuantity *q, Output *o)
   *o = (Output){.kind = RESULTANT, .of = (int)q->field + (q->kind == HYCO_QUANTITY_MOMENT ? 3 : 0), .width = -1};
   PetscCall(AddContacts(e, q, o));
   o->weight = e->out.n_weights;
-  for (PetscInt k = 0; k < o->n + e->out.surfaces.n_nodes; k++)
-    PetscCall(HycoExportAddWeight(&e->out, k < o->n && !none ? -1 : 0));
+  for (PetscInt k = 0; k < o->n + e->out.m.surfaces.n_nodes; k++) ADD_WEIGHT(e, k < o->n && !none ? -1 : 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -300,10 +302,10 @@ static PetscErrorCode AddPush(Export *e, const PetscBool of[], PetscInt axis, Ou
       .kind = RESULTANT, .of = (int)axis, .width = o->first, .first = e->out.n_contact, .weight = e->out.n_weights};
   o->n = pairs->n;
   for (PetscInt k = 0; k < pairs->n; k++) {
-    PetscCall(HycoExportAddContact(&e->out, k));
-    PetscCall(HycoExportAddWeight(&e->out, of[body[pairs->slave[k]]]));
+    ADD_CONTACT(e, k);
+    ADD_WEIGHT(e, of[body[pairs->slave[k]]]);
   }
-  for (PetscInt i = 0; i < e->out.surfaces.n_nodes; i++) PetscCall(HycoExportAddWeight(&e->out, of[e->out.body[i]]));
+  for (PetscInt i = 0; i < e->out.m.surfaces.n_nodes; i++) ADD_WEIGHT(e, of[e->out.m.surfaces.body[i]]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -320,7 +322,7 @@ static PetscErrorCode AddWork(Export *e, const HycoQuantity *q, Output *o)
   for (PetscInt b = 0, k = 0; b < e->out.m.n_slip; b++) {
     while (e->first[k] != e->contact[e->out.m.row[b]]) k++;
     if (!of[k]) continue;
-    PetscCall(HycoExportAddContact(&e->out, b));
+    ADD_CONTACT(e, b);
     o->n++;
   }
   PetscCall(PetscFree(of));
@@ -356,10 +358,10 @@ static PetscErrorCode AddQuantity(Export *e, PetscInt k)
     const PetscBool *pushed = e->travel ? HycoROMGetPushed(e->m, k) : NULL;
 
     o.n = 1;
-    PetscCall(AddRow(e, (Row){.from = QUANTITY, .index = k, .group = e->out.m.n_outputs}));
+    ADD_ROW(e, (Row){.from = QUANTITY, .index = k, .group = e->out.m.n_outputs});
     if (pushed) PetscCall(AddPush(e, pushed, q->field, &o));
   }
-  PetscCall(HycoExportAddOutput(&e->out, &o, q->name, q->unit));
+  PetscCall(AddOutput(&e->out, o, q->name, q->unit));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -375,7 +377,7 @@ static PetscErrorCode FindOutputs(Export *e)
   e->out.m.areas = (int)e->n_rows;
   for (PetscInt i = 0, k = 0; i < e->k && !e->travel; i++) {
     while (k + 1 < e->m->pairs.n && (e->first ? e->first[k + 1] : k + 1) <= e->contact[i]) k++;
-    PetscCall(AddRow(e, (Row){.from = AREA, .index = k, .group = -1}));
+    ADD_ROW(e, (Row){.from = AREA, .index = k, .group = -1});
   }
   for (PetscInt k = 0; k < s->n_quantities; k++) PetscCall(AddQuantity(e, k));
   for (PetscInt c = 0; c < s->n_contacts; c++) {
@@ -387,10 +389,10 @@ static PetscErrorCode FindOutputs(Export *e)
       if (e->travel)
         PetscCall(AddForces(e, &q, &o));
       else
-        PetscCall(AddRow(e, (Row){.from = FORCE, .index = c, .axis = a, .group = e->out.m.n_outputs}));
+        ADD_ROW(e, (Row){.from = FORCE, .index = c, .axis = a, .group = e->out.m.n_outputs});
       HycoFormat(name, "%s.force_%c", s->contact[c]->name, "xyz"[a]);
       HycoQuantityUnit(s, &q, unit);
-      PetscCall(HycoExportAddOutput(&e->out, &o, name, unit));
+      PetscCall(AddOutput(&e->out, o, name, unit));
     }
     for (PetscInt a = 0; a < 2; a++) {
       Output o = {.kind = a ? PRESSURE : CLOSED, .weight = -1};
@@ -399,7 +401,7 @@ static PetscErrorCode FindOutputs(Export *e)
       PetscCall(AddContacts(e, &q, &o));
       HycoFormat(name, "%s.%s", s->contact[c]->name, a ? "pressure_max" : "area");
       HycoQuantityUnit(s, &q, unit);
-      PetscCall(HycoExportAddOutput(&e->out, &o, name, unit));
+      PetscCall(AddOutput(&e->out, o, name, unit));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -407,7 +409,8 @@ static PetscErrorCode FindOutputs(Export *e)
 
 /* -- the problem -- */
 
-/* The rows of contacts with friction, and their blocks: those that a force along the normal moves, moves[] by row. */
+/* The rows of contacts with friction, and their blocks: those that a force along the normal moves, moves[] by row, without
+   tangents that nothing moves. */
 static PetscErrorCode FindBlocks(Export *e, const PetscReal moves[])
 {
   const HycoPairs *pairs = &e->m->model->pairs;
@@ -422,9 +425,12 @@ static PetscErrorCode FindBlocks(Export *e, const PetscReal moves[])
   for (PetscInt k = 0; k < pairs->n; k++) {
     const PetscBool rubs = (PetscBool)(e->s->contact[pairs->contact[k]]->friction != NULL);
     const PetscInt rows = rubs ? e->m->model->mesh->dim : 1;
+    PetscReal most = 0;
 
     e->first[k] = at;
+    for (PetscInt r = at; r < at + rows && moves[at] > 0; r++) most = PetscMax(most, moves[r]);
     for (PetscInt r = at; r < at + rows && moves[at] > 0; r++) {
+      if (r > at && moves[r] <= HELD_ROW * most) continue;
       o->m.normal[e->k] = r == at;
       e->contact[e->k++] = r;
     }
@@ -457,7 +463,7 @@ static PetscErrorCode FindProblem(Export *e, const PetscReal mu[])
 
   PetscFunctionBegin;
   PetscUseTypeMethod(m, unknowns, &e->p, &e->n, NULL);
-  if (e->travel) e->n = HycoTravelPlaces(e->travel);
+  if (e->travel) e->n = e->travel->bodies->bodies->ns;
   n = (size_t)(e->p + e->n);
   PetscCall(PetscMalloc4(n + 1, &e->z, n + 1, &e->w, 2, &e->unit, e->n + 1, &e->contact));
   if (e->travel)
@@ -572,51 +578,27 @@ static void Scale(const Export *e, const Samples *o, PetscReal scale[])
   }
 }
 
-/* The rows of a part, of all points. */
-static PetscErrorCode Select(const HycoFitData *all, PetscInt n, const PetscInt row[], PetscReal **y, PetscInt **group)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1((size_t)all->n_points * (size_t)n + 1, y));
-  PetscCall(PetscMalloc1(n + 1, group));
-  for (PetscInt k = 0; k < n; k++) {
-    (*group)[k] = all->group[row[k]];
-    for (PetscInt i = 0; i < all->n_points; i++)
-      (*y)[(size_t)i * (size_t)n + (size_t)k] = all->y[(size_t)i * (size_t)all->n_rows + (size_t)row[k]];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Adds the functions and coefficients of some rows to fit, whose coefficients then are rows x functions; the functions of
-   other rows have the coefficient 0. */
+/* Adds the functions and coefficients of some rows to fit, whose coefficients are those of all n_rows; the functions of other
+   rows have the coefficient 0. */
 static PetscErrorCode Join(const HycoExportFit *part, PetscInt n, const PetscInt row[], PetscInt n_rows,
                            HycoExportFit *fit)
 {
-  PetscReal *coefficient;
-  PetscInt *place, more = fit->n;
+  const size_t all = (size_t)n_rows;
 
   PetscFunctionBegin;
-  PetscCall(PetscRealloc((size_t)(fit->n + part->n) * sizeof(*fit->function), &fit->function));
-  PetscCall(PetscMalloc1(part->n, &place));
   for (PetscInt k = 0; k < part->n; k++) {
-    place[k] = 0;
-    while (place[k] < more && memcmp(&fit->function[place[k]], &part->function[k], sizeof(*part->function)) != 0)
-      place[k]++;
-    if (place[k] == more) fit->function[more++] = part->function[k];
+    PetscInt at = 0;
+
+    while (at < fit->n && memcmp(&fit->function[at], &part->function[k], sizeof(*part->function)) != 0) at++;
+    if (at == fit->n) {
+      HYCO_ADD(at, fit->function, part->function[k]);
+      HYCO_ADD(at, fit->size, part->size[k]);
+      PetscCall(PetscRealloc((size_t)++fit->n * all * sizeof(PetscReal), &fit->coefficient));
+      PetscCall(PetscArrayzero(fit->coefficient + (size_t)at * all, all));
+    }
+    for (PetscInt r = 0; r < n; r++)
+      fit->coefficient[(size_t)at * all + (size_t)row[r]] = part->coefficient[(size_t)k * (size_t)n + (size_t)r];
   }
-  PetscCall(PetscCalloc1((size_t)more * (size_t)n_rows + 1, &coefficient));
-  for (PetscInt r = 0; r < n_rows; r++) {
-    for (PetscInt k = 0; k < fit->n; k++)
-      coefficient[(size_t)r * (size_t)more + (size_t)k] = fit->coefficient[(size_t)r * (size_t)fit->n + (size_t)k];
-  }
-  for (PetscInt r = 0; r < n; r++) {
-    for (PetscInt k = 0; k < part->n; k++)
-      coefficient[(size_t)row[r] * (size_t)more + (size_t)place[k]] =
-          part->coefficient[(size_t)r * (size_t)part->n + (size_t)k];
-  }
-  PetscCall(PetscFree(place));
-  PetscCall(PetscFree(fit->coefficient));
-  fit->coefficient = coefficient;
-  fit->n = more;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -624,7 +606,8 @@ static PetscErrorCode Join(const HycoExportFit *part, PetscInt n, const PetscInt
    they belong: the rows without forces have products of them. */
 static PetscErrorCode FindSeeds(Export *e, PetscInt first, const HycoExportFit *from, PetscInt *n, HycoFunction seed[])
 {
-  const PetscInt g = e->group[first], places = e->n_groups - (e->travel ? HycoTravelBodies(e->travel) : 0);
+  const PetscInt from_rows = from == &e->response ? 2 * e->ny : e->ny, g = e->group[first],
+                 places = e->n_groups - (e->travel ? e->travel->bodies->bodies->n : 0);
 
   PetscFunctionBegin;
   *n = 0;
@@ -633,68 +616,65 @@ static PetscErrorCode FindSeeds(Export *e, PetscInt first, const HycoExportFit *
 
     for (PetscInt r = 0; r < e->ny && !has; r++) {
       const PetscInt at = r - e->p - e->k - e->travel_row;
-      const PetscBool of =
-          (PetscBool)(g < places ? e->group[r] == g : at >= 0 && HycoTravelIsFlexible(e->travel, at, g - places));
+      const PetscBool of = (PetscBool)(g < places ? e->group[r] == g
+                                                  : at >= 0 && e->travel->value[at].from == FLEXIBLE &&
+                                                        e->travel->value[at].index == g - places);
 
-      has = (PetscBool)(of && from->coefficient[(size_t)r * (size_t)from->n + (size_t)k] != 0);
+      has = (PetscBool)(of && from->coefficient[(size_t)k * (size_t)from_rows + (size_t)r] != 0);
     }
     if (has) seed[(*n)++] = from->function[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Functions of the first level that suffices for rows, up to the last one; else of that. */
-static PetscErrorCode FitRows(Export *e, PetscInt last, const HycoFitData *all, PetscInt n, const PetscInt row[],
-                              HycoExportFit *fit)
+/* Functions of the first level that suffices for data's rows, up to the last one; else the nearest ones. */
+static PetscErrorCode FitRows(Export *e, PetscInt last, const HycoFitData *data, HycoExportFit *fit)
 {
   const HycoExportFit *from =
-      e->group[row[0]] < e->n_groups - (e->travel ? HycoTravelBodies(e->travel) : 0) ? &e->response : fit;
+      e->group[data->row[0]] < e->n_groups - (e->travel ? e->travel->bodies->bodies->n : 0) ? &e->response : fit;
   HycoFunction *seed;
   PetscInt n_seeds = 0;
-  HycoFitData data = {all->n_points, n, all->atom, NULL, NULL, all->scale};
-  HycoExportFit part = {.worst = PETSC_MAX_REAL};
-  PetscReal *y;
-  PetscInt *group;
+  HycoExportFit part = {.worst = PETSC_MAX_REAL}, trial = {0}, kept; /* the best so far; the last one */
 
   PetscFunctionBegin;
-  PetscCall(Select(all, n, row, &y, &group));
-  data.y = y;
-  data.group = group;
   PetscCall(PetscMalloc1(PetscMax(from->n, 1), &seed));
   if (e->n_weights > SEVERAL) last = PetscMin(last, 1);
-  if (e->travel && fit == &e->base) PetscCall(FindSeeds(e, row[0], from, &n_seeds, seed));
-  for (PetscInt level = n_seeds ? -1 - e->n_atoms : 0; level <= last && part.worst > EXACT; level++) {
-    HycoFreeAll(&part.function, &part.coefficient);
-    PetscCall(HycoFitFunctions(e->n_atoms, e->atom, level, n_seeds, seed, EXACT, &data, &part));
+  if (e->travel && fit == &e->base) PetscCall(FindSeeds(e, data->row[0], from, &n_seeds, seed));
+  for (PetscInt together = 0; together < 2; together++) {
+    for (PetscInt level = n_seeds ? -1 - e->atoms.n : 0; level <= last && part.worst > EXACT; level++) {
+      PetscCall(HycoFitFunctions(&e->atoms, level, (PetscBool)together, n_seeds, seed, EXACT, data, &trial));
+      if (trial.worst > part.worst) continue;
+      kept = part;
+      part = trial;
+      trial = kept;
+    }
   }
+  PetscCall(HycoExportFitFree(&trial));
   PetscCall(PetscFree(seed));
-  if (!part.function) part.n = 0; /* too many were left */
-  PetscCall(Join(&part, n, row, all->n_rows, fit));
+  PetscCall(Join(&part, data->n_rows, data->row, data->stride, fit));
   if (part.worst > fit->worst || !fit->worst) {
     fit->worst = part.worst;
-    fit->worst_row = row[part.worst_row];
+    fit->worst_row = part.worst_row;
   }
-  HycoFreeAll(&part.function, &part.coefficient);
-  HycoFreeAll(&y, &group);
+  PetscCall(HycoExportFitFree(&part));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Of all rows at once, or where surfaces move of each group, whose values have few functions of the many. */
-static PetscErrorCode Fit(Export *e, PetscInt last, const HycoFitData *data, HycoExportFit *fit)
+static PetscErrorCode Fit(Export *e, PetscInt last, HycoFitData data, HycoExportFit *fit)
 {
   PetscInt *row;
 
   PetscFunctionBegin;
-  HycoFreeAll(&fit->function, &fit->coefficient);
-  *fit = (HycoExportFit){0};
-  PetscCall(PetscMalloc1(data->n_rows + 1, &row));
+  PetscCall(HycoExportFitFree(fit));
+  PetscCall(PetscMalloc1(data.stride + 1, &row));
+  data.row = row;
   for (PetscInt g = 0; g < (e->travel ? e->n_groups : 1) && fit->worst <= EXACT; g++) {
-    PetscInt n = 0;
-
-    for (PetscInt r = 0; r < data->n_rows; r++) {
-      if (!e->travel || data->group[r] == g) row[n++] = r;
+    data.n_rows = 0;
+    for (PetscInt r = 0; r < data.stride; r++) {
+      if (!e->travel || data.group[r] == g) row[data.n_rows++] = r;
     }
-    if (n && (!e->travel || data->scale[g] > 0)) PetscCall(FitRows(e, last, data, n, row, fit));
+    if (data.n_rows && (!e->travel || data.scale[g] > 0)) PetscCall(FitRows(e, last, &data, fit));
   }
   PetscCall(PetscFree(row));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -709,14 +689,14 @@ static PetscErrorCode FitBoth(Export *e, PetscInt fixed, PetscInt times)
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(e->n_groups, &scale));
   PetscCall(Sample(e, times * PetscMax(SAMPLES, EACH * e->n_weights), fixed, &o));
-  PetscCall(PetscMalloc1((size_t)o.n * (size_t)e->n_atoms + 1, &value));
-  PetscCall(HycoAtomsTabulate(e->s, e->n_atoms, e->atom, o.n, o.mu, value));
+  PetscCall(PetscMalloc1((size_t)o.n * (size_t)e->atoms.n + 1, &value));
+  PetscCall(HycoAtomsTabulate(e->s, &e->atoms, o.n, o.mu, value));
   Scale(e, &o, scale);
-  PetscCall(Fit(e, e->travel ? HYCO_FIT_LEVELS - 2 : 1, &(HycoFitData){o.n, 2 * e->ny, value, o.added, e->group, scale},
-                &e->response));
+  PetscCall(Fit(e, e->travel ? HYCO_FIT_LEVELS - 2 : 1,
+                (HycoFitData){o.n, e->atoms.n, 2 * e->ny, 0, value, o.added, NULL, e->group, scale}, &e->response));
   /* If the response has no functions the export is refused anyway: the costly levels are left out. */
   PetscCall(Fit(e, e->response.worst > EXACT ? 0 : HYCO_FIT_LEVELS - 1,
-                &(HycoFitData){o.n, e->ny, value, o.y, e->group, scale}, &e->base));
+                (HycoFitData){o.n, e->atoms.n, e->ny, 0, value, o.y, NULL, e->group, scale}, &e->base));
   HycoFreeAll(&o.y, &o.added, &o.mu, &scale, &value);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -752,20 +732,41 @@ static PetscErrorCode Refuse(Export *e)
 
 /* -- the arrays -- */
 
+/* An atom in the program, which has its expression then. */
+static PetscErrorCode Take(Export *e, HycoAtom *a, int *place)
+{
+  Model *o = &e->out.m;
+  HycoCode *code = &e->out.code;
+
+  PetscFunctionBegin;
+  if (!a->place) {
+    HYCO_ADD(o->n_atoms, o->atom, (int)code->n);
+    a->place = ++o->n_atoms;
+    PetscCall(PetscRealloc((size_t)(code->n + a->n) * sizeof(*code->text), &code->text));
+    PetscCall(PetscArraycpy(code->text + code->n, e->atoms.code.text + a->code, a->n));
+    code->n += a->n;
+  }
+  *place = (int)a->place - 1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The functions of both fits, each once; place[n]: where those of a fit are. */
 static PetscErrorCode Merge(Export *e, const HycoExportFit *fit, PetscInt place[])
 {
-  HycoExportModel *o = &e->out;
+  Model *o = &e->out.m;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < fit->n; k++) {
-    const HycoFunction *f = &fit->function[k];
+    HycoFunction f = fit->function[k];
     PetscInt at = 0;
 
-    while (at < o->m.n_functions && memcmp(&o->function[at], f, sizeof(*f)) != 0) at++;
-    if (at == o->m.n_functions) {
-      PetscCall(PetscRealloc((size_t)(at + 1) * sizeof(*o->function), &o->function));
-      o->function[o->m.n_functions++] = *f;
+    for (PetscInt j = 0; j < 4; j++) {
+      if (f.of[j] >= 0) PetscCall(Take(e, &e->atoms.atom[f.of[j]], &f.of[j]));
+    }
+    while (at < o->n_functions && memcmp(o->function + 4 * at, f.of, sizeof(f.of)) != 0) at++;
+    if (at == o->n_functions) {
+      PetscCall(PetscRealloc(4 * (size_t)(at + 1) * sizeof(*o->function), &o->function));
+      memcpy(o->function + 4 * o->n_functions++, f.of, sizeof(f.of));
     }
     place[k] = at;
   }
@@ -807,7 +808,7 @@ static PetscErrorCode ChoosePoints(Export *e, PetscReal point[], PetscReal inver
   PetscCall(PetscMalloc4(n * N, &value, n * n, &chosen, n, &scale, N, &pivot));
   PetscCall(PetscArrayzero(scale, n));
   for (PetscInt i = 0; i < N; i++) {
-    PetscCall(HycoFunctionsEvaluate(e->s, e->atom, n, e->response.function, mu + i * n_par, value + i * n));
+    PetscCall(HycoFunctionsEvaluate(e->s, &e->atoms, n, e->response.function, mu + i * n_par, value + i * n));
     for (PetscInt k = 0; k < n; k++) scale[k] = PetscMax(scale[k], PetscAbsReal(value[i * n + k]));
   }
   for (PetscInt i = 0; i < N * n; i++) value[i] /= scale[i % n];
@@ -815,7 +816,7 @@ static PetscErrorCode ChoosePoints(Export *e, PetscReal point[], PetscReal inver
   PetscCall(HycoPivotColumns(n, N, value, n, pivot));
   for (PetscInt i = 0; i < n; i++) {
     PetscCall(PetscArraycpy(point + i * n_par, mu + pivot[i] * n_par, n_par));
-    PetscCall(HycoFunctionsEvaluate(e->s, e->atom, n, e->response.function, point + i * n_par, chosen + i * n));
+    PetscCall(HycoFunctionsEvaluate(e->s, &e->atoms, n, e->response.function, point + i * n_par, chosen + i * n));
     for (PetscInt k = 0; k < n; k++) chosen[i * n + k] /= scale[k];
   }
   PetscCall(HycoPseudoInverse(n, n, chosen, 1e-12, inverse)); /* inverse[k * n + i]: of function k at point i */
@@ -881,89 +882,80 @@ static PetscErrorCode AddValues(Export *e, const PetscReal mu[], const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The terms by unknown: most have no force, and are passed over. */
-static PetscErrorCode Transpose(size_t n, HycoExportModel *o)
-{
-  const size_t terms = (size_t)o->m.n_terms;
-  PetscReal *by;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(n * terms + 1, &by));
-  for (size_t i = 0; i < n * terms; i++) by[i % n * terms + i / n] = o->m.term[i];
-  PetscCall(PetscFree(o->m.term));
-  o->m.term = by;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* size[n]: of functions at the ends, the middle and between, where a weight of a sample is not 0 everywhere. */
-static PetscErrorCode SizeFunctions(Export *e, PetscInt n, const HycoFunction f[], PetscReal size[])
-{
-  PetscReal *value, mu[HYCO_MAX_PARAMETERS];
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(n + 1, &value));
-  PetscCall(PetscArrayzero(size, n));
-  for (PetscInt k = 0; k < 7; k++) {
-    for (PetscInt p = 0; p < e->s->n_variables; p++)
-      mu[p] = e->s->lo[p] + (e->s->hi[p] - e->s->lo[p]) * (k < 3 ? (PetscReal)k / 2 : 0.07 + 0.23 * (PetscReal)(k - 3));
-    PetscCall(HycoFunctionsEvaluate(e->s, e->atom, n, f, mu, value));
-    for (PetscInt i = 0; i < n; i++) size[i] = PetscMax(size[i], PetscAbsReal(value[i]));
-  }
-  PetscCall(PetscFree(value));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Coefficients of gaps and of values without forces that are round-off beside the others of their group are 0, so
    that nothing presses where there are no loads. */
 static PetscErrorCode DropRounding(Export *e)
 {
-  const PetscInt n = e->base.n;
-  PetscReal *size, *most;
+  PetscReal *most;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(n + 1, &size));
   PetscCall(PetscCalloc1(e->n_groups, &most));
-  PetscCall(SizeFunctions(e, n, e->base.function, size));
   for (PetscInt pass = 0; pass < 2; pass++) {
-    for (PetscInt i = 0; i < e->ny * n; i++) {
-      PetscReal *of = &most[e->group[i / n]], *c = &e->base.coefficient[i];
+    for (PetscInt i = 0; i < e->ny * e->base.n; i++) {
+      const PetscReal size = PetscAbsReal(e->base.coefficient[i]) * e->base.size[i / e->ny];
+      PetscReal *of = &most[e->group[i % e->ny]];
 
-      if (!pass) *of = PetscMax(*of, PetscAbsReal(*c) * size[i % n]);
-      if (pass && PetscAbsReal(*c) * size[i % n] <= ROUNDING * *of) *c = 0;
+      if (!pass) *of = PetscMax(*of, size);
+      if (pass && size <= ROUNDING * *of) e->base.coefficient[i] = 0;
     }
   }
-  HycoFreeAll(&size, &most);
+  PetscCall(PetscFree(most));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rows of T that are more than round-off beside the others of their value, as terms. */
+/* The rows of T that are more than round-off beside the others of their value, as terms: T is sparse in (value, function). By
+   unknown, as most have no force and are passed over. */
 static PetscErrorCode KeepTerms(Export *e, const PetscInt place[], const PetscReal T[])
 {
+  Model *o = &e->out.m;
   const size_t n = (size_t)(e->p + e->k);
   const PetscInt n_f = e->response.n;
-  PetscReal *scale, *size;
+  PetscReal *size;
+  size_t *from = NULL;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(n_f, &scale, n_f, &size));
-  PetscCall(SizeFunctions(e, n_f, e->response.function, scale));
+  PetscCall(PetscMalloc1(n_f + 1, &size));
   for (PetscInt r = 0; r < e->n_rows; r++) {
     PetscReal most = 0;
 
     for (PetscInt f = 0; f < n_f; f++) {
       size[f] = 0;
       for (size_t c = 0; c < n; c++)
-        size[f] = PetscMax(size[f], scale[f] * e->unit[c >= (size_t)e->p] *
+        size[f] = PetscMax(size[f], e->response.size[f] * e->unit[c >= (size_t)e->p] *
                                         PetscAbsReal(T[((size_t)f * (size_t)e->n_rows + (size_t)r) * n + c]));
       most = PetscMax(most, size[f]);
     }
     for (PetscInt f = 0; f < n_f; f++) {
-      if (size[f] > 1e-13 * most)
-        PetscCall(
-            HycoExportAddTerm(&e->out, r, place[f], (PetscInt)n, T + ((size_t)f * (size_t)e->n_rows + (size_t)r) * n));
+      if (size[f] <= 1e-13 * most) continue;
+      HYCO_ADD(o->n_terms, o->value, (int)r);
+      HYCO_ADD(o->n_terms, o->factor, (int)place[f]);
+      HYCO_ADD(o->n_terms, from, ((size_t)f * (size_t)e->n_rows + (size_t)r) * n);
+      o->n_terms++;
     }
   }
-  PetscCall(Transpose(n, &e->out));
-  PetscCall(PetscFree2(scale, size));
+  PetscCall(PetscMalloc1((size_t)o->n_terms * n + 1, &o->term));
+  for (size_t i = 0; i < n * (size_t)o->n_terms; i++)
+    o->term[i] = T[from[i % (size_t)o->n_terms] + i / (size_t)o->n_terms];
+  HycoFreeAll(&from, &size);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The tables of a history. */
+static PetscErrorCode TakeTables(const HycoScene s, Model *o)
+{
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  o->n_tables = (int)s->n_tables;
+  PetscCall(PetscCalloc1(s->n_tables + 1, &o->table));
+  for (PetscInt k = 0; k < s->n_tables; k++) {
+    for (PetscInt i = 0; i < s->table[k].n; i++) {
+      HYCO_ADD(n, o->table_t, s->table[k].t[i]);
+      HYCO_ADD(n, o->table_value, s->table[k].value[i]);
+      n++;
+    }
+    o->table[k + 1] = (int)n;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -994,12 +986,11 @@ static PetscErrorCode Fill(Export *e)
   for (PetscInt r = 0; r < e->ny; r++) {
     for (PetscInt j = 0; j < e->base.n; j++)
       o->m.offset[(size_t)r * (size_t)o->m.n_functions + (size_t)place[j]] =
-          e->base.coefficient[(size_t)r * (size_t)e->base.n + (size_t)j];
+          e->base.coefficient[(size_t)j * (size_t)e->ny + (size_t)r];
   }
   o->m.n_parameters = (int)e->s->n_parameters;
-  o->m.n_tables = (int)e->s->n_tables;
-  o->m.table = e->s->table;
-  o->m.surfaces = e->travel ? &o->surfaces : NULL;
+  o->m.code = o->code.text;
+  PetscCall(TakeTables(e->s, &o->m));
   o->m.n_motions = e->p;
   o->m.n_places = e->k;
   o->m.n_contacts = e->travel ? e->m->model->pairs.n : e->k;
@@ -1025,36 +1016,6 @@ static PetscErrorCode Fill(Export *e)
 }
 
 /* -- comparison with the model -- */
-
-/* The program's functions in the library's arithmetic. */
-static int FunctionsHere(void *context, const double v[], double f[])
-{
-  Export *e = (Export *)context;
-
-  e->failed = HycoFunctionsEvaluate(e->s, e->atom, e->out.m.n_functions, e->out.function, v, f);
-  return e->failed != 0;
-}
-
-/* The program's results at a point, of a path at listed time j after those before it. */
-static PetscErrorCode RunHere(Export *e, const Model *model, Work *o, const PetscReal mu[], PetscInt j, PetscReal out[],
-                              PetscBool *solved)
-{
-  double kkt;
-  int its, status;
-
-  PetscFunctionBegin;
-  if (e->s->n_times) {
-    if (!j) PetscCall(PetscArrayzero(e->state, state_size(model)));
-    status = advance(model, o, FunctionsHere, e, mu, e->s->times[j], e->state, out, &kkt, &its);
-  } else {
-    (void)FunctionsHere(e, mu, o->f);
-    if (e->travel) PetscCall(HycoTravelPositions(&e->out, e->s, mu, o->room.X));
-    status = predict(model, o, out, &kkt, &its);
-  }
-  PetscCall(e->failed);
-  *solved = (PetscBool)(status == OK);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* The model's results in the order of the outputs, as above. *solved: its problem is. */
 static PetscErrorCode RunModel(Export *e, const PetscReal mu[], PetscInt j, PetscReal out[], PetscBool *solved)
@@ -1102,6 +1063,8 @@ static PetscReal ScaleOf(PetscInt n, char *const name[], const PetscReal most[],
 static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
 {
   const PetscInt n = e->out.m.n_outputs, times = PetscMax(e->s->n_times, 1);
+  double kkt;
+  int its;
   HycoSamples samples;
   const PetscReal *mu;
   PetscReal *mine, *theirs, *most, *worst;
@@ -1123,7 +1086,9 @@ static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
     if (i % times && !solved) continue; /* a path that has ended */
     PetscCall(RunModel(e, at, i % times, theirs, &theirs_solved));
     begin = clock();
-    PetscCall(RunHere(e, model, &o, at, i % times, mine, &solved));
+    if (i % times == 0) PetscCall(PetscArrayzero(e->state, state_size(model)));
+    solved = (PetscBool)(advance(model, &o, at, e->s->n_times ? e->s->times[i % times] : 0, e->state, mine, &kkt,
+                                 &its) == OK);
     e->out.seconds += (PetscReal)(clock() - begin) / CLOCKS_PER_SEC;
     e->out.checked++;
     HycoCheck(
@@ -1146,19 +1111,6 @@ static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
   }
   PetscCall(PetscFree4(mine, theirs, most, worst));
   PetscCall(HycoSamplesDestroy(&samples));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode CompareHere(Export *e)
-{
-  const Model *model = &e->out.m;
-  char *memory;
-
-  PetscFunctionBegin;
-  e->out.n_states = (PetscInt)state_size(model);
-  PetscCall(PetscMalloc1(state_size(model), &e->state));
-  PetscCall(PetscMalloc1(work_size(model) + 1, &memory));
-  HycoFinally(Compare(e, model, memory), PetscCall(PetscFree(memory)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -1207,22 +1159,22 @@ static PetscErrorCode Prepare(Export *e)
 
     if (k < 0) continue;
     e->out.m.coefficient[b] = (int)e->n_rows;
-    PetscCall(AddRow(e, (Row){.from = COEFFICIENT, .index = k, .group = -1}));
+    ADD_ROW(e, (Row){.from = COEFFICIENT, .index = k, .group = -1});
   }
-  if (e->travel) HycoTravelStart(e->travel, e->n_rows, &e->out);
-  for (PetscInt i = 0; e->travel && i < HycoTravelValues(e->travel); i++)
-    PetscCall(
-        AddRow(e, (Row){.from = TRAVEL, .index = i, .group = e->out.m.n_outputs + HycoTravelGroup(e->travel, i)}));
+  for (PetscInt i = 0; e->travel && i < e->travel->n_values; i++) {
+    const TravelValue *v = &e->travel->value[i];
+
+    /* All entries of a turn are of one size. */
+    ADD_ROW(e, (Row){.from = TRAVEL, .index = i, .group = e->out.m.n_outputs + i - (v->from == TURN ? v->part : 0)});
+  }
   for (PetscInt i = 0; i < PLACES; i++) /* nodes without regularity */
     PetscCall(PetscArraycpy(x + 3 * i, m->fe->X + 3 * ((i * 7919 + 13) % m->fe->mesh->n_nodes), 3));
-  PetscCall(HycoAtomsFind(e->s, (PetscBool)(e->travel != NULL), PLACES, x, &e->n_atoms, &e->atom));
+  PetscCall(HycoAtomsFind(e->s, (PetscBool)(e->travel != NULL), PLACES, x, &e->atoms));
   PetscCall(HycoExportWeights(m, &e->n_weights, &e->weight));
-  for (PetscInt i = 0; i < e->n_weights; i++) PetscCall(HycoAtomsAddWeight(e->s, e->weight[i], &e->n_atoms, &e->atom));
-  e->out.n_atoms = e->n_atoms;
-  e->out.atom = e->atom;
+  for (PetscInt i = 0; i < e->n_weights; i++) PetscCall(HycoAtomsAddWeight(e->s, e->weight[i], &e->atoms));
   e->ny = e->p + e->k + e->n_rows;
-  places = 2 + e->out.m.n_outputs + (e->travel ? HycoTravelValues(e->travel) : 0);
-  e->n_groups = places + (e->travel ? HycoTravelBodies(e->travel) : 1); /* of areas and coefficients of friction */
+  places = 2 + e->out.m.n_outputs + (e->travel ? e->travel->n_values : 0);
+  e->n_groups = places + (e->travel ? e->travel->bodies->bodies->n : 1); /* of areas and coefficients of friction */
   PetscCall(PetscMalloc1(2 * e->ny + 1, &e->group));
   for (PetscInt r = 0; r < 2 * e->ny; r++) {
     const PetscInt at = r % e->ny;
@@ -1230,7 +1182,7 @@ static PetscErrorCode Prepare(Export *e)
     if (at >= e->p + e->k)
       e->group[r] = e->row[at - e->p - e->k].group < 0 ? places : 2 + e->row[at - e->p - e->k].group;
     else if (at >= e->p && e->travel)
-      e->group[r] = places + HycoTravelAt(e->travel, at - e->p);
+      e->group[r] = places + HycoBodiesAt(e->travel->bodies->bodies, at - e->p);
     else
       e->group[r] = at >= e->p;
   }
@@ -1240,6 +1192,8 @@ static PetscErrorCode Prepare(Export *e)
 /* Nothing is written before the comparison has passed. */
 static PetscErrorCode Build(Export *e)
 {
+  char *memory;
+
   PetscFunctionBegin;
   PetscCall(Prepare(e));
   PetscCall(FitBoth(e, -1, 1));
@@ -1248,7 +1202,10 @@ static PetscErrorCode Build(Export *e)
     PetscCall(FitBoth(e, -1, MORE));
   if (e->base.worst > EXACT || e->response.worst > EXACT) PetscCall(Refuse(e));
   PetscCall(Fill(e));
-  PetscCall(CompareHere(e));
+  e->out.n_states = (PetscInt)state_size(&e->out.m);
+  PetscCall(PetscMalloc1(e->out.n_states, &e->state));
+  PetscCall(PetscMalloc1(work_size(&e->out.m) + 1, &memory));
+  HycoFinally(Compare(e, &e->out.m, memory), PetscCall(PetscFree(memory)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -1268,12 +1225,13 @@ static PetscErrorCode ExportC(HycoROM m, const char path[], char **description)
   ierr = Build(&e);
   if (!ierr) ierr = HycoExportWrite(&e.out, e.s, m->model->path, path, description);
   HycoPointEnd(point);
-  HycoFreeAll(&e.base.function, &e.base.coefficient, &e.response.function, &e.response.coefficient);
+  PetscCall(HycoExportFitFree(&e.base));
+  PetscCall(HycoExportFitFree(&e.response));
   PetscCall(HycoTravelDestroy(&e.travel));
   if (e.z) PetscCall(PetscFree4(e.z, e.w, e.unit, e.contact));
   for (PetscInt i = 0; i < e.n_weights; i++) PetscCall(PetscFree(e.weight[i]));
-  HycoFreeAll(&e.first, &e.state, &e.weight, &e.group, &e.atom, &e.row, &e.area);
-  PetscCall(HycoExportModelFree(&e.out));
+  HycoFreeAll(&e.first, &e.state, &e.weight, &e.group, &e.atoms.atom, &e.atoms.code.text, &e.row, &e.area);
+  PetscCall(HycoExportModelFree(&e.out, e.s));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,17 +1,20 @@
-# The text from which each exported file begins, as an array: what the library's search and a program share, then the runtime. Of the library's files it is
-# what stands between two comments; their functions become static.
+# The texts of which exported files are made, as arrays; `runtime`: what the library's search and a program share, then the runtime. Of the library's files it
+# is what stands between two comments; their functions become static.
+set(arrays "")
+function(hyco_export_text name text)
+  string(HEX "${text}" bytes)
+  string(REGEX REPLACE "(..)" "0x\\1," bytes "${bytes}")
+  set(arrays "${arrays}extern const char HycoExport_${name}[];\nconst char HycoExport_${name}[] = {${bytes}0};\n" PARENT_SCOPE)
+endfunction()
 set(text "")
-set(paths include/private/hycocoulomb.h extensions/export/runtime/paths.c) # in programs of paths alone
-foreach(file extensions/export/runtime/library.c include/private/hycomesh.h include/private/hycovector.h src/contact/nearest.h src/contact/master_search.h
-             src/contact/nearest.c src/contact/master_search.c include/private/hycosceneimpl.h extensions/export/runtime/model.h
-             extensions/export/runtime/surfaces.c extensions/export/runtime/runtime.c include/private/hycocoulomb.h extensions/export/runtime/paths.c)
+set(begin "/* -- begin: in exported models too -- */")
+set(end "/* -- end: in exported models too -- */")
+set(runtime extensions/export/runtime)
+foreach(file ${runtime}/library.c include/private/hycomesh.h include/private/hycovector.h src/contact/nearest.h src/contact/master_search.h
+             src/contact/nearest.c src/contact/master_search.c include/private/hycosceneimpl.h include/private/hycocoulomb.h ${runtime}/expression.h
+             ${runtime}/model.h ${runtime}/surfaces.c ${runtime}/runtime.c ${runtime}/paths.c)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${file})
   file(READ ${PROJECT_SOURCE_DIR}/${file} rest)
-  set(begin "/* -- begin: in exported models too -- */")
-  set(end "/* -- end: in exported models too -- */")
-  if(file IN_LIST paths)
-    string(APPEND text "#if defined(PATHS)\n")
-  endif()
   if(file MATCHES "^extensions")
     string(REGEX REPLACE "#include \"[^\n]*\n" "" rest "${rest}")
     string(APPEND text "${rest}\n")
@@ -29,12 +32,13 @@ foreach(file extensions/export/runtime/library.c include/private/hycomesh.h incl
     string(SUBSTRING "${rest}" ${at} -1 rest)
     string(FIND "${rest}" "${begin}" at)
   endwhile()
-  if(file IN_LIST paths)
-    string(APPEND text "#endif\n")
-  endif()
 endforeach()
-string(HEX "${text}" bytes)
-string(REGEX REPLACE "(..)" "0x\\1," bytes "${bytes}")
-file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/export_runtime.c
-     CONTENT "extern const char HycoExportRuntime[];\nconst char HycoExportRuntime[] = {@bytes@0};\n" @ONLY)
+hyco_export_text(runtime "${text}")
+foreach(name header.h predict.h step.h calls.c predict.c step.c)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${runtime}/${name})
+  file(READ ${PROJECT_SOURCE_DIR}/${runtime}/${name} text)
+  string(REPLACE "." "_" name ${name})
+  hyco_export_text(${name} "${text}")
+endforeach()
+file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/export_runtime.c CONTENT "@arrays@" @ONLY)
 list(APPEND HYCO_SOURCES ${PROJECT_BINARY_DIR}/export_runtime.c)

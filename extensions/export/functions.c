@@ -32,37 +32,30 @@ static void Deflate(PetscInt n, const PetscReal q[], PetscReal v[])
 
 /* -- atoms -- */
 
-PetscErrorCode HycoAtomTranslate(HycoScene s, const HycoAtom *a, const PetscReal mu[], PetscReal *value, HycoText *c)
+static PetscReal ValueOf(const HycoAtoms *atoms, const HycoAtom *a, const PetscReal mu[])
 {
-  PetscReal first = 0;
-  PetscBool valid;
-
-  PetscFunctionBegin;
-  PetscCall(HycoTranslate(s, a->text, a->change ? a->to : a->x, mu, value, c, &valid, NULL, NULL));
-  if (!a->change) PetscFunctionReturn(PETSC_SUCCESS);
-  if (c) PetscCall(HycoTextAdd(c, " - "));
-  PetscCall(HycoTranslate(s, a->text, a->x, mu, &first, c, &valid, NULL, NULL));
-  *value -= first;
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return value_of(atoms->code.text + a->code, mu, NULL);
 }
 
-/* Whether muParser has the same values at the ends and the middle of the ranges. */
-static PetscErrorCode Agrees(HycoScene s, const HycoAtom *atom, PetscBool *agrees)
+/* Whether muParser has the same values at the ends and the middle of the ranges; axis as in Add(). */
+static PetscErrorCode Agrees(HycoScene s, const char key[], const char text[], const PetscReal x[], PetscInt axis,
+                             const PetscReal code[], PetscBool *agrees)
 {
-  PetscReal mu[HYCO_MAX_PARAMETERS], mine, theirs, first = 0;
+  PetscReal mu[HYCO_MAX_PARAMETERS], mine, theirs, first = 0, to[3] = {x[0], x[1], x[2]};
   HycoExpr e;
   PetscErrorCode ierr = 0;
 
   PetscFunctionBegin;
-  PetscCall(HycoSceneExpression(s, atom->key, atom->text, &e));
+  if (axis >= 0) to[axis] += 1;
+  PetscCall(HycoSceneExpression(s, key, text, &e));
   *agrees = PETSC_TRUE;
   for (PetscInt k = 0; k < 3 && !ierr && *agrees; k++) {
     for (PetscInt p = 0; p < s->n_variables; p++) mu[p] = s->lo[p] + (s->hi[p] - s->lo[p]) * (PetscReal)k / 2;
-    PetscCall(HycoAtomTranslate(s, atom, mu, &mine, NULL));
+    mine = value_of(code, mu, NULL);
     /* An atom that is not finite somewhere in the ranges is no candidate. */
     if (PetscIsInfOrNanReal(mine)) *agrees = PETSC_FALSE;
-    if (*agrees) ierr = HycoExprEval(e, mu, 1, atom->change ? atom->to : atom->x, &theirs);
-    if (*agrees && !ierr && atom->change) ierr = HycoExprEval(e, mu, 1, atom->x, &first);
+    if (*agrees) ierr = HycoExprEval(e, mu, 1, to, &theirs);
+    if (*agrees && !ierr && axis >= 0) ierr = HycoExprEval(e, mu, 1, x, &first);
     if (*agrees && !ierr)
       *agrees = (PetscBool)(PetscAbsReal(mine - (theirs - first)) <=
                             SAME * PetscMax(PetscAbsReal(theirs), PetscAbsReal(first)));
@@ -72,34 +65,10 @@ static PetscErrorCode Agrees(HycoScene s, const HycoAtom *atom, PetscBool *agree
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether an atom is a constant, or one of those that are there: by its values at some points of the ranges. */
-static PetscErrorCode IsNew(HycoScene s, const HycoAtom *one, PetscInt n, const HycoAtom atom[], PetscBool *is)
-{
-  static const PetscReal at[] = {0.07, 0.38, 0.61, 0.93};
-  PetscReal mu[HYCO_MAX_PARAMETERS], value[4], other;
-
-  PetscFunctionBegin;
-  *is = PETSC_TRUE;
-  for (PetscInt k = -1; k < n && *is; k++) { /* -1: its own first value */
-    PetscBool same = PETSC_TRUE;
-
-    for (PetscInt i = 0; i < 4; i++) {
-      /* Each parameter at its own place, so that no two of them look alike. */
-      for (PetscInt p = 0; p < s->n_variables; p++)
-        mu[p] = s->lo[p] + (s->hi[p] - s->lo[p]) * at[(i + p) % 4] / (1 + 0.1 * (PetscReal)p);
-      if (k < 0) PetscCall(HycoAtomTranslate(s, one, mu, &value[i], NULL));
-      other = value[0];
-      if (k >= 0) PetscCall(HycoAtomTranslate(s, &atom[k], mu, &other, NULL));
-      same = (PetscBool)(same && PetscAbsReal(value[i] - other) <= SAME * PetscAbsReal(other));
-    }
-    *is = (PetscBool)!same;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Whether an atom is a sum of others and a constant, by its values at irregular points of the ranges: then its products are
-   sums of theirs. */
-static PetscErrorCode IsSum(HycoScene s, const HycoAtom *one, PetscInt n, const HycoAtom atom[], PetscBool *is)
+/* Whether an atom is a sum of the n others and, or of a constant (constant: whether that counts), by its values at irregular
+   points of the ranges: then its products are sums of theirs. */
+static PetscErrorCode IsSum(HycoScene s, const HycoAtoms *all, const HycoAtom *one, PetscBool constant, PetscInt n,
+                            const HycoAtom atom[], PetscBool *is)
 {
   const PetscInt N = 2 * (n + 2) + 16;
   PetscReal mu[HYCO_MAX_PARAMETERS], *q;
@@ -108,7 +77,7 @@ static PetscErrorCode IsSum(HycoScene s, const HycoAtom *one, PetscInt n, const 
   PetscFunctionBegin;
   *is = PETSC_FALSE;
   PetscCall(PetscMalloc1((n + 2) * N, &q));
-  for (PetscInt k = 0; k < n + 2; k++) { /* the constant, the others, then `one` */
+  for (PetscInt k = !constant; k < n + 2; k++) { /* the constant, the others, then `one` */
     PetscReal *v = q + kept * N, size, left;
 
     for (PetscInt i = 0; i < N; i++) {
@@ -117,8 +86,7 @@ static PetscErrorCode IsSum(HycoScene s, const HycoAtom *one, PetscInt n, const 
 
         mu[p] = s->lo[p] + (s->hi[p] - s->lo[p]) * (at - PetscFloorReal(at));
       }
-      v[i] = 1;
-      if (k) PetscCall(HycoAtomTranslate(s, k <= n ? &atom[k - 1] : one, mu, &v[i], NULL));
+      v[i] = k ? ValueOf(all, k <= n ? &atom[k - 1] : one, mu) : 1;
     }
     size = PetscSqrtReal(Product(N, v, v));
     for (PetscInt j = 0; j < 2 * kept; j++) Deflate(N, q + j % kept * N, v); /* twice, against round-off */
@@ -131,103 +99,99 @@ static PetscErrorCode IsSum(HycoScene s, const HycoAtom *one, PetscInt n, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* axis: of a change of the place by 1; -1: none. Atoms on which muParser and this parser differ are left out silently: the fit then decides without them. */
+/* axis: of a change of the place by 1, as the entries of a turn by a map; -1: none. Atoms on which muParser and the parser
+   differ are left out silently, the fit then decides without them; so are constants, and multiples of others. */
 static PetscErrorCode Add(HycoScene s, const char key[], const char text[], const PetscReal x[3], PetscInt axis,
-                          PetscBool space, PetscInt *n, HycoAtom **atom)
+                          PetscBool space, PetscBool weight, HycoAtoms *all)
 {
-  HycoAtom one = {.key = key, .text = text, .change = (PetscBool)(axis >= 0), .x = {x[0], x[1], x[2]}};
-  PetscBool agrees = PETSC_FALSE, sum = PETSC_FALSE;
+  HycoAtom one = {.change = (PetscBool)(axis >= 0), .weight = weight};
+  PetscReal to[3] = {x[0], x[1], x[2]};
+  PetscBool agrees = PETSC_TRUE, sum = PETSC_FALSE;
 
   PetscFunctionBegin;
-  for (PetscInt c = 0; c < 3 && axis >= 0; c++) one.to[c] = x[c] + (c == axis);
-  PetscCall(Agrees(s, &one, &agrees));
-  if (agrees) PetscCall(IsNew(s, &one, *n, *atom, &agrees));
-  if (!agrees) PetscFunctionReturn(PETSC_SUCCESS);
+  if (axis >= 0) to[axis] += 1;
+  PetscCall(HycoParse(s, text, to, axis < 0 ? NULL : x, &all->code, &one.code, NULL, NULL));
+  one.n = all->code.n - one.code;
+  if (one.code < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Agrees(s, key, text, x, axis, all->code.text + one.code, &agrees));
+  for (PetscInt k = -1; k < all->n && agrees && !sum; k++)
+    PetscCall(IsSum(s, all, &one, (PetscBool)(k < 0), k >= 0, all->atom + PetscMax(k, 0), &sum));
   /* At each place another sum, of a few functions: all of them would be too many candidates. */
-  if (space) {
-    PetscCall(IsSum(s, &one, *n, *atom, &sum));
-    if (sum) PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(PetscRealloc((size_t)(*n + 1) * sizeof(**atom), atom));
-  (*atom)[(*n)++] = one;
+  if (agrees && !sum && space) PetscCall(IsSum(s, all, &one, PETSC_TRUE, all->n, all->atom, &sum));
+  if (!agrees || sum) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoGrow(all->n, all->room, all->atom);
+  all->atom[all->n++] = one;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoAtomsAddWeight(HycoScene s, const char text[], PetscInt *n, HycoAtom **atom)
+PetscErrorCode HycoAtomsAddWeight(HycoScene s, const char text[], HycoAtoms *atoms)
 {
   const PetscReal nowhere[3] = {0, 0, 0};
-  const PetscInt before = *n;
 
   PetscFunctionBegin;
-  PetscCall(Add(s, "weight of a sample", text, nowhere, -1, PETSC_FALSE, n, atom));
-  if (*n > before) (*atom)[before].weight = PETSC_TRUE;
+  PetscCall(Add(s, "weight of a sample", text, nowhere, -1, PETSC_FALSE, PETSC_TRUE, atoms));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a text was taken. */
-static PetscBool Known(const char text[], PetscInt n, const HycoAtom atom[])
+PetscErrorCode HycoAtomsFind(HycoScene s, PetscBool travels, PetscInt n, const PetscReal x[], HycoAtoms *atoms)
 {
-  for (PetscInt k = 0; k < n; k++) {
-    if (!strcmp(atom[k].text, text)) return PETSC_TRUE;
-  }
-  return PETSC_FALSE;
-}
-
-PetscErrorCode HycoAtomsFind(HycoScene s, PetscBool travels, PetscInt n, const PetscReal x[], PetscInt *n_atoms,
-                             HycoAtom **atom)
-{
-  PetscReal value;
-  PetscBool valid, uses, space, map;
+  PetscInt at;
+  PetscBool uses, space, map;
 
   PetscFunctionBegin;
-  *n_atoms = 0;
-  *atom = NULL;
   for (PetscInt p = 0; p < s->n_variables; p++)
-    PetscCall(Add(s, s->parameter[p], s->parameter[p], x, -1, PETSC_FALSE, n_atoms, atom));
+    PetscCall(Add(s, s->parameter[p], s->parameter[p], x, -1, PETSC_FALSE, PETSC_FALSE, atoms));
   for (PetscInt k = 0; k < s->n_entries; k++) {
     /* Entries that cannot change K, F, B or D, and constants, which occur within other entries. */
-    if (!strncmp(s->key[k], "output_", 7) || !strncmp(s->key[k], "scene_", 6) || !strncmp(s->key[k], "constant_", 9) ||
-        Known(s->value[k], *n_atoms, *atom))
+    if (!strncmp(s->key[k], "output_", 7) || !strncmp(s->key[k], "scene_", 6) || !strncmp(s->key[k], "constant_", 9))
       continue;
-    PetscCall(HycoTranslate(s, s->value[k], x, s->lo, &value, NULL, &valid, &uses, &space));
+    PetscCall(HycoParse(s, s->value[k], x, NULL, &atoms->code, &at, &uses, &space));
+    if (at < 0 || !uses) continue;
     map = (PetscBool)(strstr(s->key[k], "_map_") != NULL);
-    for (PetscInt c = 0; valid && uses && space && map && c < 3; c++)
-      PetscCall(Add(s, s->key[k], s->value[k], x, c, PETSC_FALSE, n_atoms, atom));
-    for (PetscInt i = 0; valid && uses && !(map && travels) && i < (space ? n : 1); i++)
-      PetscCall(Add(s, s->key[k], s->value[k], x + 3 * i, -1, space, n_atoms, atom));
+    for (PetscInt c = 0; space && map && c < 3; c++)
+      PetscCall(Add(s, s->key[k], s->value[k], x, c, PETSC_FALSE, PETSC_FALSE, atoms));
+    for (PetscInt i = 0; !(map && travels) && i < (space ? n : 1); i++)
+      PetscCall(Add(s, s->key[k], s->value[k], x + 3 * i, -1, space, PETSC_FALSE, atoms));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* value[n x atoms] */
+PetscErrorCode HycoAtomsTabulate(HycoScene s, const HycoAtoms *all, PetscInt n, const PetscReal mu[], PetscReal value[])
+{
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < n * all->n; i++)
+    value[i] = ValueOf(all, &all->atom[i % all->n], mu + i / all->n * s->n_variables);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* -- candidates -- */
 
-/* value[k] = a b d / c; not finite where c is 0. */
-PetscErrorCode HycoFunctionsEvaluate(HycoScene s, const HycoAtom atom[], PetscInt n, const HycoFunction f[],
+/* Not finite where a divisor is 0. */
+PetscErrorCode HycoFunctionsEvaluate(HycoScene s, const HycoAtoms *atoms, PetscInt n, const HycoFunction f[],
                                      const PetscReal mu[], PetscReal value[])
 {
+  PetscReal *atom;
+
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < n; k++) {
-    const PetscInt of[4] = {f[k].a, f[k].b, f[k].d, f[k].c};
-
-    value[k] = 1;
-    for (PetscInt j = 0; j < 4; j++) {
-      PetscReal one = 1;
-
-      if (of[j] >= 0) PetscCall(HycoAtomTranslate(s, &atom[of[j]], mu, &one, NULL));
-      value[k] = j < 3 ? value[k] * one : value[k] / one;
-    }
-  }
+  PetscCall(PetscMalloc1(atoms->n + 1, &atom));
+  PetscCall(HycoAtomsTabulate(s, atoms, 1, mu, atom));
+  for (PetscInt k = 0; k < n; k++) value[k] = product(f[k].of, atom);
+  PetscCall(PetscFree(atom));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A weight of a sample is one of the factors at most, and no divisor. */
-static PetscBool Sensible(const HycoAtom atom[], PetscInt a, PetscInt b, PetscInt c, PetscInt d)
+/* Adds a candidate a b d / c, unless a weight of a sample is a divisor, or two of the factors; f NULL: counts it. */
+static void Candidate(const HycoAtom atom[], PetscInt a, PetscInt b, PetscInt c, PetscInt d, PetscInt *n,
+                      HycoFunction f[])
 {
-  const PetscInt of[3] = {a, b, d};
+  const HycoFunction one = {{(int)a, (int)b, (int)d, (int)c}};
   PetscInt weights = 0;
 
-  for (PetscInt k = 0; k < 3; k++) weights += of[k] >= 0 && atom[of[k]].weight;
-  return (PetscBool)(weights < 2 && (c < 0 || (!atom[c].weight && a != c && b != c)));
+  for (PetscInt k = 0; k < 3; k++) weights += one.of[k] >= 0 && atom[one.of[k]].weight;
+  if (weights > 1 || (c >= 0 && (atom[c].weight || a == c || b == c))) return;
+  if (f) f[*n] = one;
+  ++*n;
 }
 
 /* All candidates of a level, the simpler ones first; f NULL: counts them. */
@@ -235,31 +199,17 @@ static PetscInt Candidates(PetscInt m, const HycoAtom atom[], PetscInt level, Hy
 {
   PetscInt n = 0;
 
-#define CANDIDATE(...)                                                                                                 \
-  do {                                                                                                                 \
-    const HycoFunction one = {__VA_ARGS__};                                                                            \
-                                                                                                                       \
-    if (!Sensible(atom, one.a, one.b, one.c, one.d)) break;                                                            \
-    if (f) f[n] = one;                                                                                                 \
-    n++;                                                                                                               \
-  } while (0)
   /* The constant first: the choice prefers earlier candidates. */
-  CANDIDATE(-1, -1, -1, -1);
-  for (PetscInt a = 0; a < m; a++) CANDIDATE(a, -1, -1, -1);
-  for (PetscInt a = -1; level > 0 && a < m; a++) {
-    for (PetscInt c = 0; c < m; c++) CANDIDATE(a, -1, c, -1);
-  }
+  for (PetscInt a = -1; a < m; a++) Candidate(atom, a, -1, -1, -1, &n, f);
+  for (PetscInt k = 0; level > 0 && k < (m + 1) * m; k++) Candidate(atom, k / m - 1, -1, k % m, -1, &n, f);
   for (PetscInt c = -1; level > 1 && c < (level > 2 ? m : 0); c++) {
-    for (PetscInt a = 0; a < m; a++) {
-      for (PetscInt b = a; b < m; b++) CANDIDATE(a, b, c, -1);
+    for (PetscInt k = 0; k < m * m; k++) {
+      if (k / m <= k % m) Candidate(atom, k / m, k % m, c, -1, &n, f);
     }
   }
-  for (PetscInt a = 0; level > 3 && a < m; a++) {
-    for (PetscInt b = a; b < m; b++) {
-      for (PetscInt d = b; d < m; d++) CANDIDATE(a, b, -1, d);
-    }
+  for (PetscInt k = 0; level > 3 && k < m * m * m; k++) {
+    if (k / m / m <= k / m % m && k / m % m <= k % m) Candidate(atom, k / m / m, k / m % m, -1, k % m, &n, f);
   }
-#undef CANDIDATE
   return n;
 }
 
@@ -274,10 +224,12 @@ static PetscInt FromSeeds(PetscInt m, const HycoAtom atom[], PetscInt only, Pets
   for (PetscInt k = 0; k < n_seeds * (m + 1); k++) {
     const PetscInt a = k % (m + 1) - 1;
     HycoFunction one = seed[k / (m + 1)];
-    PetscInt *const slot = one.a < 0 ? &one.a : one.b < 0 ? &one.b : one.d < 0 ? &one.d : NULL;
+    PetscInt slot = 0;
 
-    if (a >= 0 && ((only >= 0 && a != only) || !slot || atom[a].weight || atom[a].change || a == one.c)) continue;
-    if (a >= 0) *slot = a;
+    while (slot < 3 && one.of[slot] >= 0) slot++;
+    if (a >= 0 && ((only >= 0 && a != only) || slot == 3 || atom[a].weight || atom[a].change || a == one.of[3]))
+      continue;
+    if (a >= 0) one.of[slot] = (int)a;
     if (f) f[n] = one;
     n++;
   }
@@ -292,51 +244,33 @@ static PetscBool Held(PetscInt k)
   return (PetscBool)(k % 3 == 2);
 }
 
-/* values[k * N + i] of the functions at all N points. */
-static void Tabulate(PetscInt n_atoms, const HycoFitData *d, PetscInt n, const HycoFunction f[], PetscReal value[])
+/* Value r of the fit's rows at point i; the scale of its errors. */
+static PetscReal Y(const HycoFitData *d, PetscInt i, PetscInt r)
 {
-  for (PetscInt i = 0; i < d->n_points; i++) {
-    const PetscReal *at = d->atom + (size_t)i * (size_t)n_atoms;
-
-    for (PetscInt k = 0; k < n; k++)
-      value[(size_t)k * (size_t)d->n_points + (size_t)i] =
-          (f[k].a < 0 ? 1 : at[f[k].a]) * (f[k].b < 0 ? 1 : at[f[k].b]) * (f[k].d < 0 ? 1 : at[f[k].d]) /
-          (f[k].c < 0 ? 1 : at[f[k].c]);
-  }
+  return d->y[(size_t)i * (size_t)d->stride + (size_t)d->row[r]];
 }
 
-PetscErrorCode HycoAtomsTabulate(HycoScene s, PetscInt n_atoms, const HycoAtom atom[], PetscInt n, const PetscReal mu[],
-                                 PetscReal value[])
+static PetscReal ScaleOf(const HycoFitData *d, PetscInt r)
 {
-  PetscFunctionBegin;
-  for (PetscInt i = 0; i < n; i++) {
-    for (PetscInt a = 0; a < n_atoms; a++)
-      PetscCall(HycoAtomTranslate(s, &atom[a], mu + i * s->n_variables, &value[(size_t)i * (size_t)n_atoms + (size_t)a],
-                                  NULL));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return d->scale[d->group[d->row[r]]];
 }
 
-/* Drops functions that are 0 or not finite somewhere. */
-static PetscErrorCode Clean(PetscInt N, PetscInt *n, HycoFunction f[], PetscReal value[])
+/* values[k * N + i] of the functions at all N points, without those that are 0 or not finite somewhere. */
+static void Tabulate(const HycoFitData *d, PetscInt *n, HycoFunction f[], PetscReal value[])
 {
   PetscInt kept = 0;
 
-  PetscFunctionBegin;
   for (PetscInt k = 0; k < *n; k++) {
-    const PetscReal *v = value + (size_t)k * (size_t)N;
-    PetscReal most = 0, sum = 0;
+    PetscReal *v = value + (size_t)kept * (size_t)d->n_points, most = 0, sum = 0;
 
-    for (PetscInt i = 0; i < N; i++) {
+    for (PetscInt i = 0; i < d->n_points; i++) {
+      v[i] = product(f[k].of, d->atom + (size_t)i * (size_t)d->n_atoms);
       most = PetscMax(most, PetscAbsReal(v[i]));
       sum += v[i];
     }
-    if (most == 0 || PetscIsInfOrNanReal(sum)) continue;
-    PetscCall(PetscArraymove(value + (size_t)kept * (size_t)N, v, N));
-    f[kept++] = f[k];
+    if (most > 0 && !PetscIsInfOrNanReal(sum)) f[kept++] = f[k];
   }
   *n = kept;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Combinations of the rows at the fitted points, in units of their groups: target[MIXED * N], other points 0. */
@@ -344,16 +278,14 @@ static void Mix(const HycoFitData *d, PetscReal target[])
 {
   for (PetscInt i = 0; i < MIXED * d->n_points; i++) target[i] = 0;
   for (PetscInt i = 0; i < d->n_points; i++) {
-    const PetscReal *y = d->y + (size_t)i * (size_t)d->n_rows;
-
     for (PetscInt r = 0; r < d->n_rows && !Held(i); r++) {
-      if (d->scale[d->group[r]] == 0) continue;
+      if (ScaleOf(d, r) == 0) continue;
       for (PetscInt c = 0; c < MIXED; c++) {
         /* Irregular weights: no row cancels in all combinations. The cost of a choice is then that of MIXED rows,
            not of all. */
         const PetscReal share = (r + 1) * (0.61803398874989485 + 0.075 * c);
 
-        target[c * d->n_points + i] += (share - PetscFloorReal(share) - 0.5) * y[r] / d->scale[d->group[r]];
+        target[c * d->n_points + i] += (share - PetscFloorReal(share) - 0.5) * Y(d, i, r) / ScaleOf(d, r);
       }
     }
   }
@@ -421,149 +353,128 @@ static PetscErrorCode Choose(const HycoFitData *d, PetscInt *n, HycoFunction f[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Least squares at the fitted points: coefficient (n_rows x n), and the error at the others. */
-static PetscErrorCode Solve(const HycoFitData *d, PetscInt n, const PetscReal value[], HycoExportFit *fit)
+/* Least squares at the fitted points: the coefficients and sizes of fit's functions, and the error at the others. */
+static PetscErrorCode Solve(const HycoFitData *d, const PetscReal value[], HycoExportFit *fit)
 {
-  const PetscInt N = d->n_points;
-  PetscReal *A, *P, *scale, *left;
+  const PetscInt N = d->n_points, n = fit->n;
+  PetscReal *A, *P, *left;
   PetscInt *at, m = 0;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc4((size_t)n * (size_t)N, &A, (size_t)n * (size_t)N, &P, n, &scale, N, &at));
+  HycoFreeAll(&fit->coefficient, &fit->size);
+  PetscCall(PetscCalloc1((size_t)n * (size_t)d->n_rows + 1, &fit->coefficient));
+  PetscCall(PetscCalloc1(n + 1, &fit->size));
+  PetscCall(PetscMalloc4((size_t)n * (size_t)N, &A, (size_t)n * (size_t)N, &P, N, &left, N, &at));
   for (PetscInt i = 0; i < N; i++) {
     if (!Held(i)) at[m++] = i;
   }
   for (PetscInt k = 0; k < n; k++) {
-    scale[k] = 0;
-    for (PetscInt i = 0; i < N; i++)
-      scale[k] = PetscMax(scale[k], PetscAbsReal(value[(size_t)k * (size_t)N + (size_t)i]));
-    for (PetscInt i = 0; i < m; i++) A[k * m + i] = value[(size_t)k * (size_t)N + (size_t)at[i]] / scale[k];
+    const PetscReal *v = value + (size_t)k * (size_t)N;
+
+    for (PetscInt i = 0; i < N; i++) fit->size[k] = PetscMax(fit->size[k], PetscAbsReal(v[i]));
+    for (PetscInt i = 0; i < m; i++) A[k * m + i] = v[at[i]] / fit->size[k];
   }
   PetscCall(HycoPseudoInverse(m, n, A, 1e-14, P)); /* n x m by columns */
-  PetscCall(PetscArrayzero(fit->coefficient, (size_t)n * (size_t)d->n_rows));
-  PetscCall(PetscMalloc1(m + 1, &left));
-  for (PetscInt r = 0; r < d->n_rows * PASSES; r++) {
-    PetscReal *c = fit->coefficient + (size_t)(r / PASSES) * (size_t)n;
+  fit->worst = 0;
+  fit->worst_row = d->row[0];
+  for (PetscInt r = 0; r < d->n_rows; r++) {
+    PetscReal *c = fit->coefficient + r;
+    const size_t next = (size_t)d->n_rows;
 
     /* Refined: a product with a pseudo-inverse loses the digits of its condition. */
-    for (PetscInt i = 0; i < m; i++) {
-      left[i] = d->y[(size_t)at[i] * (size_t)d->n_rows + (size_t)(r / PASSES)];
-      for (PetscInt k = 0; k < n; k++) left[i] -= c[k] * A[k * m + i];
+    for (PetscInt pass = 0; pass < PASSES; pass++) {
+      for (PetscInt i = 0; i < m; i++) {
+        left[i] = Y(d, at[i], r);
+        for (PetscInt k = 0; k < n; k++) left[i] -= c[(size_t)k * next] * A[k * m + i];
+      }
+      for (PetscInt i = 0; i < m; i++) {
+        for (PetscInt k = 0; k < n; k++) c[(size_t)k * next] += P[i * n + k] * left[i];
+      }
     }
-    for (PetscInt i = 0; i < m; i++) {
-      for (PetscInt k = 0; k < n; k++) c[k] += P[i * n + k] * left[i];
-    }
-  }
-  PetscCall(PetscFree(left));
-  for (PetscInt r = 0; r < d->n_rows; r++) {
-    for (PetscInt k = 0; k < n; k++) fit->coefficient[(size_t)r * (size_t)n + (size_t)k] /= scale[k];
-  }
-  fit->worst = 0;
-  fit->worst_row = 0;
-  for (PetscInt i = 0; i < N; i++) {
-    for (PetscInt r = 0; Held(i) && r < d->n_rows; r++) {
-      PetscReal error = -d->y[(size_t)i * (size_t)d->n_rows + (size_t)r];
+    for (PetscInt k = 0; k < n; k++) c[(size_t)k * next] /= fit->size[k];
+    for (PetscInt i = 2; i < N; i += 3) { /* Held() */
+      PetscReal error = -Y(d, i, r);
 
-      for (PetscInt k = 0; k < n; k++)
-        error += fit->coefficient[(size_t)r * (size_t)n + (size_t)k] * value[(size_t)k * (size_t)N + (size_t)i];
+      for (PetscInt k = 0; k < n; k++) error += c[(size_t)k * next] * value[(size_t)k * (size_t)N + (size_t)i];
       /* Also where the scale is 0 and the error, too; otherwise the division gives infinity, which is refused. */
-      if (PetscAbsReal(error) <= fit->worst * d->scale[d->group[r]]) continue;
-      fit->worst = PetscAbsReal(error) / d->scale[d->group[r]];
-      fit->worst_row = r;
+      if (PetscAbsReal(error) <= fit->worst * ScaleOf(d, r)) continue;
+      fit->worst = PetscAbsReal(error) / ScaleOf(d, r);
+      fit->worst_row = d->row[r];
     }
   }
-  PetscCall(PetscFree4(A, P, scale, at));
+  PetscCall(PetscFree4(A, P, left, at));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The functions whose largest part of any row exceeds a share of the row's group; n: their number. */
-static PetscErrorCode Prune(const HycoFitData *d, const HycoExportFit *fit, PetscReal share, const PetscReal value[],
-                            PetscInt *n, PetscInt keep[])
+PetscErrorCode HycoExportFitFree(HycoExportFit *fit)
 {
-  PetscReal *part;
-
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(fit->n, &part));
-  *n = 0;
-  for (PetscInt k = 0; k < fit->n; k++) {
-    PetscReal size = 0;
-
-    for (PetscInt i = 0; i < d->n_points; i++)
-      size = PetscMax(size, PetscAbsReal(value[(size_t)k * (size_t)d->n_points + (size_t)i]));
-    for (PetscInt r = 0; r < d->n_rows; r++) {
-      const PetscReal here = size * PetscAbsReal(fit->coefficient[(size_t)r * (size_t)fit->n + (size_t)k]);
-
-      if (d->scale[d->group[r]] > 0) part[k] = PetscMax(part[k], here / d->scale[d->group[r]]);
-    }
-    if (part[k] > share) keep[(*n)++] = k;
-  }
-  PetscCall(PetscFree(part));
+  HycoFreeAll(&fit->function, &fit->coefficient, &fit->size);
+  *fit = (HycoExportFit){0};
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Leaves out the functions that are round-off, as long as the fit is as good. */
-static PetscErrorCode Reduce(const HycoFitData *d, PetscReal tol, PetscReal value[], HycoExportFit *fit)
+/* Leaves out the functions whose part of each row is below a share of the row's group, round-off, as long as the fit is as
+   good. */
+static PetscErrorCode Reduce(const HycoFitData *d, PetscReal tol, const PetscReal value[], HycoExportFit *fit)
 {
-  static const PetscReal share[] = {1e-6, 1e-9, 1e-12};
-  PetscInt *keep;
   PetscReal *less;
-  HycoExportFit trial;
+  HycoExportFit part = {0};
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(fit->n, &keep, (size_t)fit->n * (size_t)d->n_points, &less));
-  for (size_t j = 0; j < sizeof(share) / sizeof(share[0]); j++) {
-    trial = *fit;
-    PetscCall(Prune(d, fit, share[j], value, &trial.n, keep));
-    PetscCall(PetscMalloc1((size_t)trial.n * (size_t)d->n_rows + 1, &trial.coefficient));
-    for (PetscInt k = 0; k < trial.n; k++)
-      PetscCall(PetscArraycpy(less + (size_t)k * (size_t)d->n_points, value + (size_t)keep[k] * (size_t)d->n_points,
+  PetscCall(PetscMalloc1((size_t)fit->n * (size_t)d->n_points, &less));
+  for (PetscReal share = 1e-6; share > 1e-13; share *= 1e-3) {
+    PetscCall(HycoExportFitFree(&part));
+    PetscCall(PetscMalloc1(fit->n, &part.function));
+    for (PetscInt k = 0; k < fit->n; k++) {
+      PetscReal most = 0;
+
+      for (PetscInt r = 0; r < d->n_rows; r++) {
+        const PetscReal here = fit->size[k] * PetscAbsReal(fit->coefficient[(size_t)k * (size_t)d->n_rows + (size_t)r]);
+
+        if (ScaleOf(d, r) > 0) most = PetscMax(most, here / ScaleOf(d, r));
+      }
+      if (most <= share) continue;
+      PetscCall(PetscArraycpy(less + (size_t)part.n * (size_t)d->n_points, value + (size_t)k * (size_t)d->n_points,
                               d->n_points));
-    if (trial.n) PetscCall(Solve(d, trial.n, less, &trial));
-    if (trial.n && trial.worst <= tol) {
-      /* In place (fit's own array): keep ascends. */
-      for (PetscInt k = 0; k < trial.n; k++) trial.function[k] = trial.function[keep[k]];
-      PetscCall(PetscFree(fit->coefficient));
-      *fit = trial;
-      break;
+      part.function[part.n++] = fit->function[k];
     }
-    PetscCall(PetscFree(trial.coefficient));
+    if (part.n) PetscCall(Solve(d, less, &part));
+    if (!part.n || part.worst > tol) continue;
+    PetscCall(HycoExportFitFree(fit));
+    *fit = part;
+    part = (HycoExportFit){0};
+    break;
   }
-  PetscCall(PetscFree2(keep, less));
+  PetscCall(HycoExportFitFree(&part));
+  PetscCall(PetscFree(less));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Both arrays are the caller's, also when worst > tol. */
-PetscErrorCode HycoFitFunctions(PetscInt n_atoms, const HycoAtom atom[], PetscInt level, PetscInt n_seeds,
+/* The arrays are the caller's, also when worst > tol. */
+PetscErrorCode HycoFitFunctions(const HycoAtoms *atoms, PetscInt level, PetscBool together, PetscInt n_seeds,
                                 const HycoFunction seed[], PetscReal tol, const HycoFitData *d, HycoExportFit *fit)
 {
+  const HycoAtom *atom = atoms->atom;
   const PetscInt most =
-      level < 0 ? FromSeeds(n_atoms, atom, -2 - level, n_seeds, seed, NULL) : Candidates(n_atoms, atom, level, NULL);
+      level < 0 ? FromSeeds(atoms->n, atom, -2 - level, n_seeds, seed, NULL) : Candidates(atoms->n, atom, level, NULL);
   PetscReal *value;
 
   PetscFunctionBegin;
-  fit->n = 0;
+  PetscCall(HycoExportFitFree(fit));
   fit->worst = PETSC_MAX_REAL;
   if (most < 1 || most > MANY) PetscFunctionReturn(PETSC_SUCCESS);
+  fit->n = most;
   PetscCall(PetscMalloc1(most, &fit->function));
   PetscCall(PetscMalloc1((size_t)most * (size_t)d->n_points, &value));
-  /* Chosen one by one; these may miss some that depend nearly on others: then all together, if they are few. */
-  for (PetscInt pass = 0; pass < 2 && fit->worst > tol; pass++) {
-    fit->n = most;
-    if (level < 0)
-      (void)FromSeeds(n_atoms, atom, -2 - level, n_seeds, seed, fit->function);
-    else
-      (void)Candidates(n_atoms, atom, level, fit->function);
-    Tabulate(n_atoms, d, fit->n, fit->function, value);
-    PetscCall(Clean(d->n_points, &fit->n, fit->function, value));
-    if (pass && fit->n > d->n_points / 2) {
-      fit->n = 0;
-      break;
-    }
-    if (!pass) PetscCall(Choose(d, &fit->n, fit->function, value));
-    PetscCall(PetscFree(fit->coefficient));
-    PetscCall(PetscMalloc1((size_t)fit->n * (size_t)d->n_rows + 1, &fit->coefficient));
-    PetscCall(Solve(d, fit->n, value, fit));
-  }
+  if (level < 0)
+    (void)FromSeeds(atoms->n, atom, -2 - level, n_seeds, seed, fit->function);
+  else
+    (void)Candidates(atoms->n, atom, level, fit->function);
+  Tabulate(d, &fit->n, fit->function, value);
+  if (together && fit->n > d->n_points / 2) fit->n = 0;
+  if (!together) PetscCall(Choose(d, &fit->n, fit->function, value));
+  if (fit->n) PetscCall(Solve(d, value, fit));
   if (fit->worst <= tol) PetscCall(Reduce(d, tol, value, fit));
   PetscCall(PetscFree(value));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -7,20 +7,6 @@
 #define POINTS 9     /* at which it is found out which bodies turn and which displacements are prescribed */
 #define TURNED 1e-12 /* of an entry of Q: more is no round-off */
 
-typedef struct {
-  enum { FLEXIBLE, HELD, TURN } from;
-  PetscInt index, part; /* body or unknown; term of the flexibility, entry of Q */
-} Value;
-
-struct _n_HycoTravel {
-  HycoROM m;
-  HycoBodiesWork bodies; /* the model's */
-  Value *value;
-  PetscInt n_values, room, *node; /* node: by node of the program, of the model's mesh */
-  PetscReal mu[HYCO_MAX_PARAMETERS];
-  PetscBool placed; /* the model is at mu */
-};
-
 PetscErrorCode HycoTravelDestroy(HycoTravel *travel)
 {
   PetscFunctionBegin;
@@ -29,13 +15,7 @@ PetscErrorCode HycoTravelDestroy(HycoTravel *travel)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode AddValue(HycoTravel t, Value value)
-{
-  PetscFunctionBegin;
-  HycoGrow(t->n_values, t->room, t->value);
-  t->value[t->n_values++] = value;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+#define ADD_VALUE(t, ...) HYCO_APPEND((t)->n_values, (t)->value, (TravelValue){__VA_ARGS__})
 
 /* Moves the model. */
 static PetscErrorCode Bring(HycoTravel t, const PetscReal mu[])
@@ -140,7 +120,7 @@ static PetscErrorCode FindNodes(HycoTravel t, HycoExportModel *out, PetscInt num
 {
   HycoMesh m = t->m->fe->mesh;
   const HycoScene s = t->m->model->scene;
-  Surfaces *u = &out->surfaces;
+  Surfaces *u = &out->m.surfaces;
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < m->n_nodes; i++) number[i] = -1;
@@ -161,11 +141,21 @@ static PetscErrorCode FindNodes(HycoTravel t, HycoExportModel *out, PetscInt num
     t->node[u->n_nodes] = i;
     number[i] = u->n_nodes++; /* ascending, as in the mesh */
   }
-  PetscCall(PetscMalloc1(u->n_nodes, &out->body));
-  PetscCall(PetscMalloc1(3 * u->n_nodes, &out->drawn));
+  PetscCall(PetscMalloc1(u->n_nodes, &u->body));
+  PetscCall(PetscMalloc1(3 * u->n_nodes, &u->drawn));
   for (PetscInt i = 0; i < u->n_nodes; i++) {
-    out->body[i] = m->node_body[t->node[i]];
-    PetscCall(PetscArraycpy(out->drawn + 3 * i, m->xyz + 3 * t->node[i], 3));
+    u->body[i] = (int)m->node_body[t->node[i]];
+    PetscCall(PetscArraycpy(u->drawn + 3 * i, m->xyz + 3 * t->node[i], 3));
+  }
+  PetscCall(PetscMalloc1(3 * s->n_bodies, &u->map));
+  for (PetscInt k = 0; k < 3 * s->n_bodies; k++) {
+    const HycoExpr map = s->body[k / 3].map[k % 3];
+    PetscInt at = -1;
+
+    if (map) PetscCall(HycoParse(s, HycoExportEntry(s, HycoExprKey(map)), NULL, NULL, &out->code, &at, NULL, NULL));
+    HycoCheck(!map || at >= 0, "export: the map %s cannot be exported: it is no expression that is known",
+              HycoExprKey(map));
+    u->map[k] = (int)at;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -174,32 +164,27 @@ static PetscErrorCode FindNodes(HycoTravel t, HycoExportModel *out, PetscInt num
 static PetscErrorCode AddSurface(HycoTravel t, PetscInt group, const PetscInt number[], HycoExportModel *out)
 {
   const HycoFE fe = t->m->fe;
-  Surfaces *u = &out->surfaces;
-  Surface *all = u->surface, *of;
-  PetscInt *facet = u->facet, *border = u->border;
-  PetscBool *at = u->at_border;
+  Surfaces *u = &out->m.surfaces;
+  Surface *of = &u->surface[out->n_surfaces];
   HycoMasterSearch search;
 
   PetscFunctionBegin;
   PetscCall(HycoMasterSearchCreateOn(fe, group, group, PETSC_FALSE, &search));
   PetscCall(HycoMasterSearchBorder(&search));
-  of = &all[out->n_surfaces];
   of->first = out->n_surfaces ? of[-1].first + of[-1].n : 0;
   of->n = search.n;
   of->n_border = search.n_border;
   of->border = 2 * out->n_border;
   of->at_border = out->n_surfaces * u->n_nodes;
   of->side = search.n && fe->mirrored[fe->mesh->node_body[search.node[0]]] ? -1 : 1;
-  PetscCall(PetscRealloc((size_t)((of->first + of->n) * u->nf + 1) * sizeof(*facet), &facet));
-  PetscCall(PetscRealloc((size_t)(of->border + 2 * of->n_border + 1) * sizeof(*border), &border));
-  PetscCall(PetscRealloc((size_t)(of->at_border + u->n_nodes + 1) * sizeof(*at), &at));
-  for (PetscInt k = 0; k < of->n * u->nf; k++) facet[of->first * u->nf + k] = number[search.node[k]];
-  for (PetscInt k = 0; k < 2 * of->n_border; k++) border[of->border + k] = number[search.border[k]];
-  for (PetscInt i = 0; i < u->n_nodes; i++) at[of->at_border + i] = search.at_border[t->node[i]];
-  u->facet = facet;
-  u->border = border;
-  u->at_border = at;
+  PetscCall(PetscRealloc((size_t)((of->first + of->n) * u->nf + 1) * sizeof(*u->facet), &u->facet));
+  PetscCall(PetscRealloc((size_t)(of->border + 2 * of->n_border + 1) * sizeof(*u->border), &u->border));
+  PetscCall(PetscRealloc((size_t)(of->at_border + u->n_nodes + 1) * sizeof(*u->at_border), &u->at_border));
+  for (PetscInt k = 0; k < of->n * u->nf; k++) u->facet[of->first * u->nf + k] = number[search.node[k]];
+  for (PetscInt k = 0; k < 2 * of->n_border; k++) u->border[of->border + k] = number[search.border[k]];
+  for (PetscInt i = 0; i < u->n_nodes; i++) u->at_border[of->at_border + i] = search.at_border[t->node[i]];
   u->n_facets = PetscMax(u->n_facets, of->n);
+  out->n_facets += of->n;
   out->n_border += of->n_border;
   out->n_surfaces++;
   PetscCall(HycoMasterSearchDestroy(&search));
@@ -210,26 +195,22 @@ static PetscErrorCode AddSurface(HycoTravel t, PetscInt group, const PetscInt nu
 static PetscErrorCode TakeElement(const HycoFE fe, Surfaces *u)
 {
   const HycoElement *el = HycoElementGetFacet(fe->mesh->type);
-  PetscReal *w, *N, *dN;
 
   PetscFunctionBegin;
   u->dim = fe->dim;
   u->nf = el->nv;
   u->nq = el->nq;
   u->around = fe->formulation == HYCO_AXISYMMETRIC ? 2 * PETSC_PI : 0;
-  PetscCall(PetscMalloc1(el->nq, &w));
-  PetscCall(PetscMalloc1(el->nq * el->nv, &N));
-  PetscCall(PetscMalloc1(2 * el->nq * el->nv, &dN));
+  PetscCall(PetscMalloc1(el->nq, &u->w));
+  PetscCall(PetscMalloc1(el->nq * el->nv, &u->N));
+  PetscCall(PetscMalloc1(2 * el->nq * el->nv, &u->dN));
   for (PetscInt k = 0; k < el->nq * el->nv; k++) {
     const PetscInt q = k / el->nv, a = k % el->nv;
 
-    w[q] = el->w[q];
-    N[k] = el->N[q][a];
-    for (PetscInt d = 0; d < 2; d++) dN[2 * k + d] = el->dN[q][a][d];
+    u->w[q] = el->w[q];
+    u->N[k] = el->N[q][a];
+    for (PetscInt d = 0; d < 2; d++) u->dN[2 * k + d] = el->dN[q][a][d];
   }
-  u->w = w;
-  u->N = N;
-  u->dN = dN;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -238,18 +219,13 @@ static PetscErrorCode FindSurfaces(HycoTravel t, const PetscInt number[], HycoEx
 {
   const HycoScene s = t->m->model->scene;
   const HycoPairs *pairs = &t->m->pairs;
-  Surfaces *u = &out->surfaces;
-  Facing *search;
-  Surface *surface;
-  PetscInt *node;
+  Surfaces *u = &out->m.surfaces;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(s->n_contacts, &search));
-  u->search = search;
-  PetscCall(PetscCalloc1(2 * s->n_contacts, &surface));
-  u->surface = surface;
-  PetscCall(PetscMalloc1(pairs->n, &node));
-  u->node = node;
+  PetscCall(PetscCalloc1(s->n_contacts, &u->search));
+  PetscCall(PetscCalloc1(s->n_contacts, &u->reach));
+  PetscCall(PetscCalloc1(2 * s->n_contacts, &u->surface));
+  PetscCall(PetscMalloc1(pairs->n, &u->slave));
   u->n_searches = s->n_contacts;
   for (PetscInt c = 0; c < s->n_contacts; c++) {
     PetscInt g[2] = {0, 0};
@@ -257,14 +233,13 @@ static PetscErrorCode FindSurfaces(HycoTravel t, const PetscInt number[], HycoEx
     PetscCall(HycoMeshFindGroup(t->m->fe->mesh, "contact", s->contact[c]->slave, &g[0]));
     PetscCall(HycoMeshFindGroup(t->m->fe->mesh, "contact", s->contact[c]->master, &g[1]));
     for (PetscInt k = 0; k < 2; k++) PetscCall(AddSurface(t, g[k], number, out));
-    search[c].slave = 2 * c;
-    search[c].master = 2 * c + 1;
-    search[c].reach = pairs->search[c].reach;
+    u->search[c] = (Facing){.slave = 2 * c, .master = 2 * c + 1};
+    u->reach[c] = pairs->search[c].reach;
   }
   for (PetscInt k = pairs->n - 1; k >= 0; k--) {
-    search[pairs->contact[k]].first = k;
-    search[pairs->contact[k]].n++;
-    node[k] = number[pairs->slave[k]];
+    u->search[pairs->contact[k]].first = k;
+    u->search[pairs->contact[k]].n++;
+    u->slave[k] = number[pairs->slave[k]];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -275,18 +250,14 @@ static PetscErrorCode FindPlaces(HycoTravel t, const PetscBool moves[], const Pe
 {
   const HycoSubstructures b = t->bodies->bodies;
   const HycoFE fe = t->m->fe;
-  Surfaces *u = &out->surfaces;
-  int *place, *given, *pose;
+  Surfaces *u = &out->m.surfaces;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(u->n_nodes * u->dim, &place));
-  u->place = place;
-  PetscCall(PetscMalloc1(u->n_nodes * u->dim, &given));
-  u->given = given;
-  PetscCall(PetscMalloc1(u->n_nodes, &pose));
-  u->pose = pose;
+  PetscCall(PetscMalloc1(u->n_nodes * u->dim, &u->place));
+  PetscCall(PetscMalloc1(u->n_nodes * u->dim, &u->given));
+  PetscCall(PetscMalloc1(u->n_nodes, &u->pose));
   for (PetscInt k = 0; k < b->n; k++) {
-    for (PetscInt term = 0; term < b->body[k].C.n_terms; term++) PetscCall(AddValue(t, (Value){FLEXIBLE, k, term}));
+    for (PetscInt term = 0; term < b->body[k].C.n_terms; term++) ADD_VALUE(t, FLEXIBLE, k, term);
   }
   for (PetscInt i = 0; i < u->n_nodes; i++) {
     PetscInt body = -1;
@@ -294,20 +265,20 @@ static PetscErrorCode FindPlaces(HycoTravel t, const PetscBool moves[], const Pe
     for (PetscInt c = 0; c < u->dim; c++) {
       const PetscInt dof = t->node[i] * u->dim + c, at = t->bodies->loc[dof];
 
-      place[i * u->dim + c] = fe->fixed[dof] ? PRESCRIBED : at >= 0 && at < b->ns ? (int)at : UNKNOWN;
-      given[i * u->dim + c] = -1;
-      if (place[i * u->dim + c] >= 0) body = HycoBodiesAt(b, at);
+      u->place[i * u->dim + c] = fe->fixed[dof] ? PRESCRIBED : at >= 0 && at < b->ns ? (int)at : UNKNOWN;
+      u->given[i * u->dim + c] = -1;
+      if (u->place[i * u->dim + c] >= 0) body = HycoBodiesAt(b, at);
       if (!fe->fixed[dof] || !moves[dof]) continue;
-      given[i * u->dim + c] = (int)t->n_values;
-      PetscCall(AddValue(t, (Value){HELD, dof, 0}));
+      u->given[i * u->dim + c] = (int)t->n_values;
+      ADD_VALUE(t, HELD, dof, 0);
     }
-    pose[i] = body >= 0 && turns[body] ? -2 - (int)body : -1;
+    u->pose[i] = body >= 0 && turns[body] ? -2 - (int)body : -1;
   }
   for (PetscInt k = 0; k < b->n; k++) {
     for (PetscInt i = 0; i < u->n_nodes && turns[k]; i++) {
-      if (pose[i] == -2 - (int)k) pose[i] = (int)t->n_values;
+      if (u->pose[i] == -2 - (int)k) u->pose[i] = (int)t->n_values;
     }
-    for (PetscInt e = 0; e < 9 && turns[k]; e++) PetscCall(AddValue(t, (Value){TURN, k, e}));
+    for (PetscInt e = 0; e < 9 && turns[k]; e++) ADD_VALUE(t, TURN, k, e);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -346,7 +317,7 @@ static PetscErrorCode Make(HycoTravel t, HycoExportModel *out)
   PetscFunctionBegin;
   PetscCall(Check(t->m));
   t->bodies = (HycoBodiesWork)t->m->work;
-  PetscCall(TakeElement(t->m->fe, &out->surfaces));
+  PetscCall(TakeElement(t->m->fe, &out->m.surfaces));
   PetscCall(PetscMalloc1(t->m->fe->mesh->n_nodes, &number));
   PetscCall(PetscCalloc2(t->m->fe->n_dof, &moves, t->bodies->bodies->n, &turns));
   PetscCall(FindNodes(t, out, number));
@@ -358,13 +329,39 @@ static PetscErrorCode Make(HycoTravel t, HycoExportModel *out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether parameters move a surface whose masters are searched for: a map without any only places it. */
+static PetscErrorCode Travels(HycoROM m, PetscBool *travels)
+{
+  const HycoScene s = m->model->scene;
+  const HycoMesh mesh = m->fe->mesh;
+  PetscBool all[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  *travels = PETSC_FALSE;
+  for (PetscInt p = 0; p < HYCO_MAX_PARAMETERS; p++) all[p] = PETSC_TRUE;
+  for (PetscInt c = 0; c < 2 * s->n_contacts; c++) {
+    PetscInt g = 0;
+
+    if (!HycoPairsFollows(&m->pairs, c / 2)) continue;
+    PetscCall(HycoMeshFindGroup(mesh, "contact", c % 2 ? s->contact[c / 2]->master : s->contact[c / 2]->slave, &g));
+    for (PetscInt k = 0; k < 3 * mesh->n_facets; k++) {
+      const HycoExpr map = s->body[mesh->node_body[mesh->facets[k / 3 * mesh->nf]]].map[k % 3];
+
+      *travels = (PetscBool)(*travels || (mesh->facet_group[k / 3] == g && HycoExprChanges(map, all)));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoTravelCreate(HycoROM m, HycoExportModel *out, HycoTravel *travel)
 {
   HycoTravel t;
+  PetscBool travels;
 
   PetscFunctionBegin;
   *travel = NULL;
-  if (!m->pairs.room) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Travels(m, &travels));
+  if (!travels) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&t));
   t->m = m;
   *travel = t;
@@ -373,21 +370,6 @@ PetscErrorCode HycoTravelCreate(HycoROM m, HycoExportModel *out, HycoTravel *tra
 }
 
 /* -- the problem -- */
-
-PetscInt HycoTravelPlaces(HycoTravel t)
-{
-  return ((HycoSubstructures)t->m->model->data)->ns;
-}
-
-PetscInt HycoTravelBodies(HycoTravel t)
-{
-  return t->bodies->bodies->n;
-}
-
-PetscInt HycoTravelAt(HycoTravel t, PetscInt place)
-{
-  return HycoBodiesAt(t->bodies->bodies, place);
-}
 
 void HycoTravelUnknowns(HycoTravel t, PetscReal z[])
 {
@@ -420,14 +402,9 @@ PetscErrorCode HycoTravelMotions(HycoTravel t, const PetscReal mu[], PetscReal Z
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscInt HycoTravelValues(HycoTravel t)
-{
-  return t->n_values;
-}
-
 PetscReal HycoTravelValue(HycoTravel t, PetscInt i)
 {
-  const Value *v = &t->value[i];
+  const TravelValue *v = &t->value[i];
 
   if (v->from == FLEXIBLE && t->bodies->bodies->body[v->index].n_samples > 1)
     return t->bodies->share[v->index][v->part] / t->bodies->kappa[v->index];
@@ -447,32 +424,6 @@ PetscInt HycoTravelBody(HycoTravel t, PetscInt body)
   return -1;
 }
 
-const PetscReal *HycoTravelTurn(HycoTravel t, PetscInt k)
-{
-  return t->bodies->pose[k].Q;
-}
-
-PetscBool HycoTravelIsFlexible(HycoTravel t, PetscInt i, PetscInt k)
-{
-  return (PetscBool)(t->value[i].from == FLEXIBLE && t->value[i].index == k);
-}
-
-/* All entries of a turn are of one size. */
-PetscInt HycoTravelGroup(HycoTravel t, PetscInt i)
-{
-  return t->value[i].from == TURN ? i - t->value[i].part : i;
-}
-
-void HycoTravelStart(HycoTravel t, PetscInt first, HycoExportModel *out)
-{
-  Surfaces *u = &out->surfaces;
-  int *given = u->given, *pose = u->pose;
-
-  (void)t;
-  for (PetscInt i = 0; i < u->n_nodes * u->dim; i++) given[i] += given[i] < 0 ? 0 : (int)first;
-  for (PetscInt i = 0; i < u->n_nodes; i++) pose[i] += pose[i] < 0 ? 0 : (int)first;
-}
-
 PetscReal HycoTravelNumbers(HycoTravel t)
 {
   PetscReal sum = 0;
@@ -485,36 +436,23 @@ PetscReal HycoTravelNumbers(HycoTravel t)
 PetscErrorCode HycoTravelBlocks(HycoTravel t, PetscInt first, HycoExportModel *out)
 {
   const HycoSubstructures b = t->bodies->bodies;
+  Surfaces *u = &out->m.surfaces;
+  size_t at = 0;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(t->n_values, &out->m.block));
+  for (PetscInt i = 0; i < u->n_nodes * u->dim; i++) u->given[i] += u->given[i] < 0 ? 0 : (int)first;
+  for (PetscInt i = 0; i < u->n_nodes; i++) u->pose[i] += u->pose[i] < 0 ? 0 : (int)first;
+  out->n_flexible = (PetscInt)HycoTravelNumbers(t);
+  PetscCall(PetscMalloc1(out->n_flexible + 1, &out->m.flexibility));
+  PetscCall(PetscMalloc1(t->n_values + 1, &out->m.block));
   for (PetscInt i = 0; i < t->n_values && t->value[i].from == FLEXIBLE; i++) {
     const HycoFlexibility *f = &b->body[t->value[i].index].C;
     const size_t n = (size_t)f->n;
-    PetscReal *C;
 
     if (!n) continue;
-    PetscCall(PetscMalloc1(n * n, &C));
+    out->m.block[out->m.n_blocks++] = (Block){(int)b->start[t->value[i].index], (int)n, (int)(first + i), (int)at};
     for (size_t k = 0; k < n * n; k++)
-      C[k] = HycoFlexibilityEntry(f, t->value[i].part, (PetscInt)(k / n), (PetscInt)(k % n));
-    out->m.block[out->m.n_blocks++] = (Block){(int)b->start[t->value[i].index], (int)n, (int)(first + i), C};
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoTravelPositions(const HycoExportModel *out, HycoScene s, const PetscReal mu[], PetscReal X[])
-{
-  PetscBool valid;
-
-  PetscFunctionBegin;
-  PetscCall(PetscArraycpy(X, out->drawn, 3 * out->surfaces.n_nodes));
-  for (PetscInt i = 0; i < 3 * out->surfaces.n_nodes; i++) {
-    const HycoExpr map = s->body[out->body[i / 3]].map[i % 3];
-
-    if (!map) continue;
-    PetscCall(HycoTranslate(s, HycoExportEntry(s, HycoExprKey(map)), out->drawn + i - i % 3, mu, &X[i], NULL, &valid,
-                            NULL, NULL));
-    HycoCheck(valid, "export: the map %s cannot be exported: it is no expression that is known", HycoExprKey(map));
+      out->m.flexibility[at++] = HycoFlexibilityEntry(f, t->value[i].part, (PetscInt)(k / n), (PetscInt)(k % n));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -44,7 +44,7 @@ parameter: {press: {range: [0.01, 0.05]}, lift: {range: [0, 0.02]}, soft: {range
 constant: {half: 4^-2^-1, pressure: "min(half, half*weight^2, 2) - -2^2*1e-2*(weight > 0.5 && rint(weight) == 1 ? exp(-weight) : log10(1 + weight))"}
 body:
   plate: {young: "soft < 1.5 ? 500*soft : 10^(soft + 1)", poisson: 0.3}
-  pad: {young: 100, poisson: 0.3}
+  pad: {young: 100, poisson: 0.3, map: {x: 1.1*x + 0.1, y: 0.9*y, z: z}}
 fixed: {base: {x: 0, y: 0, z: 0}, press: {x: 0, y: 0, z: -press}}
 pressure: {side: pressure}
 contact: {under: {type: surface, slave: sole, master: top, gap: "lift + 0.01*(x^2 + y^2)"}}
@@ -241,13 +241,13 @@ class Export(Case):
         names, *rows = run.stdout.splitlines()
         return names.split(), np.array([[float(v) for v in row.split()] for row in rows])
 
-    def judge(self, name, scene, outputs):
+    def judge(self, name, scene, outputs, level='-O0'):
         """The program of a model of the scene against predict, at 64 points with corners and faces; its outputs begin with those of the scene."""
         self.hyco('train', '-scene', scene, '-hyco_model_type', 'bodies', '-scatter', '2', '-model', name + '.h5')
         said = self.run_raw('export', '-model', name + '.h5', '-c', name + '.c')
         self.assertEqual((said.returncode, said.stderr), (0, ''))
         self.run_raw('predict', '-model', name + '.h5', '-scatter', '64', '-table', 't.h5')
-        self.compiled(name)
+        self.compiled(name, level=level)
         with h5py.File(self.path('t.h5')) as t:
             table = {key: np.array(t[key]) for key in t}
         with open(self.path(name + '.h'), encoding='ascii') as f:
@@ -266,6 +266,12 @@ class Export(Case):
         closed = table['n_active']
         self.assertLess(closed.min(), closed.max())  # the set of closed contacts changes over the points
         return points, names
+
+    def difference(self, name):
+        """That of the program of NAME.h5 from the model, as the export says."""
+        run = self.run_raw('export', '-model', name + '.h5', '-c', name + '.c')
+        self.assertEqual(run.returncode, 0, run.stderr)
+        return float(run.stdout.split('largest difference from the model ')[1].split()[0])
 
     def judge_path(self, name, scene, points, level='-O0'):
         """The program of a model of paths against predict at each listed time, beside corners of the ranges; returns the outputs by name."""
@@ -301,7 +307,7 @@ class Export(Case):
         with open(self.path('float.yaml'), 'w', encoding='ascii') as f:
             f.write(FLOATING)
         points, names = self.judge('floating', self.path('float.yaml'),
-                                   ['peak', 'sink', 'corner', 'spread', 'base', 'turn', 'most', 'least', 'tension', 'hoop'])
+                                   ['peak', 'sink', 'corner', 'spread', 'base', 'turn', 'most', 'least', 'tension', 'hoop'], '-O1')
         mu = points[0].copy()
         for value, status in ((2, 0), (4.001, 1), (float('nan'), 2), (float('inf'), 2)):
             mu[0] = value
@@ -313,7 +319,7 @@ class Export(Case):
         self.assertNotRegex(subprocess.run(['nm', self.path('floating.o')], capture_output=True, text=True, check=True).stdout, r' [bBC] ')  # no variables
 
     def test_pad(self):
-        """3D: an opening gap, a modulus with a kink, a pressure by a constant of the scene."""
+        """3D: an opening gap under a body that a map without parameters places, a modulus with a kink, a pressure by a constant of the scene."""
         self.drawn('drawn_pad', 3, PAD[1], PAD[0])
         self.judge('pad', self.path('drawn_pad'), ['stress', 'push', 'mean', 'area'])
 
@@ -335,15 +341,23 @@ class Export(Case):
         """2D: the radius of a tool that travels over a plate, to beyond its edge, whose end is drawn aside: flexibilities between samples, moved normals and areas."""
         self.drawn('drawn_shape', 2, SHAPE[1], SHAPE[0])
         self.judge('shape', self.path('drawn_shape'), ['force', 'hold', 'most', 'stress', 'sink', 'touch'])
+        # two parameters of its shape, under a load
+        scene = SHAPE[0]
+        for old, new in (('push]', 'push, tall]'), ('radius: {range: [3, 6]}', 'radius: {range: [5, 6]}, tall: {range: [1, 1.1]}'), ('"y + x^2', '"y*tall + x^2'),
+                         (', y: -push}}', '}}\npressure: {grip: 100*push}'), ('reaction: y, group: grip', 'reaction: x, group: grip')):
+            self.assertIn(old, scene)
+            scene = scene.replace(old, new)
+        with open(self.path('drawn_shape', 'two.yaml'), 'w', encoding='ascii') as f:
+            f.write(scene)
+        self.hyco('train', '-scene', self.path('drawn_shape', 'two.yaml'), '-hyco_model_type', 'bodies', '-scatter', '2', '-hyco_validation', '0', '-model', 'two.h5')
+        self.assertLess(self.difference('two'), 1e-9)
 
     def test_displaced(self):
         """Four parameters of given displacements that vary in space on a body that turns by a small angle: found whatever the number of expressions."""
         with open(self.path('displaced.yaml'), 'w', encoding='ascii') as f:
             f.write(DISPLACED)
         self.hyco('train', '-scene', 'displaced.yaml', '-hyco_model_type', 'bodies', '-scatter', '12', '-hyco_validation', '0', '-model', 'displaced.h5')
-        run = self.run_raw('export', '-model', 'displaced.h5', '-c', 'displaced.c')
-        self.assertEqual(run.returncode, 0, run.stderr)
-        self.assertLess(float(run.stdout.split('largest difference from the model ')[1].split()[0]), 1e-11)
+        self.assertLess(self.difference('displaced'), 1e-11)
 
     def test_refused(self):
         """One line names what cannot be exported, and no file is written."""
@@ -364,17 +378,19 @@ class Export(Case):
             self.assertFalse([f for f in os.listdir(self.folder) if f.startswith('no.')])
 
     def test_existing(self):
-        """A file of another origin is not overwritten, neither FILE.c nor FILE.h; own ones are."""
-        self.hyco('train', '-scene', os.path.join(SOURCE, 'examples', 'roller'), '-hyco_model_type', 'bodies', '-scatter', '2', '-model', 'roller.h5')
+        """A file of another origin is not overwritten, neither FILE.c nor FILE.h; own ones are. A gap that a parameter closes just so presses nothing without loads."""
+        self.hyco('train', '-scene', os.path.join(SOURCE, 'examples', 'pellet'), '-hyco_model_type', 'bodies', '-scatter', '2', '-hyco_validation', '0', '-model', 'pellet.h5')
         for name in ('mine.h', 'mine.c'):
             with open(self.path(name), 'w', encoding='ascii') as f:
                 f.write('int mine;\n')
-            run = self.run_raw('export', '-model', 'roller.h5', '-c', 'mine.c')
+            run = self.run_raw('export', '-model', 'pellet.h5', '-c', 'mine.c')
             self.assertEqual((run.returncode, len(run.stderr.strip().splitlines())), (1, 1), run.stderr)
             self.assertIn(name, run.stderr)
             with open(self.path(name), encoding='ascii') as f:
                 self.assertEqual(f.read(), 'int mine;\n')
             os.remove(self.path(name))
+        for _ in range(2):
+            self.assertEqual(self.run_raw('export', '-model', 'pellet.h5', '-c', 'mine.c').stderr, '')
 
 
 if __name__ == '__main__':

@@ -4,7 +4,11 @@
 #include "../../src/contact/master_search.h"
 #include <math.h>
 
-#define PATHS
+/* An expression that the test gives: see value_of(). */
+#define value_of library_value_of
+#include "../../extensions/export/runtime/expression.h"
+#undef value_of
+static double value_of(const double *code, const double v[], const double x[]);
 #include "../../extensions/export/runtime/runtime.c"
 #include <hycocoulomb.h>
 #include "../../extensions/export/runtime/paths.c"
@@ -17,7 +21,8 @@ typedef struct {
   Model model;
 } Problem;
 
-static int one = 0;
+static int one = 0, first[] = {0, 3, 6}, function[] = {0, -1, -1, -1, 1, -1, -1, -1, 2, -1, -1, -1};
+static double constant[] = {NUMBER, 1, END};
 
 /* rank: of W, without motions; a rank below the number of forces makes forces that are not unique. */
 static void Make(int n, int p, int rank, unsigned long long *state, Problem *o)
@@ -41,7 +46,11 @@ static void Make(int n, int p, int rank, unsigned long long *state, Problem *o)
     for (int j = 0; j < p; j++) o->offset[p + i] += o->A[j * n + i] * x[j];
     for (int j = 0; j < n; j++) o->offset[p + i] -= o->W[i > j ? i * (i + 1) / 2 + j : j * (j + 1) / 2 + i] * o->L[j];
   }
-  o->model = (Model){.n_functions = 1,
+  o->model = (Model){.n_atoms = 1,
+                     .n_functions = 1,
+                     .atom = first,
+                     .function = function,
+                     .code = constant,
                      .n_motions = p,
                      .n_places = n,
                      .n_contacts = n,
@@ -57,6 +66,7 @@ static void Make(int n, int p, int rank, unsigned long long *state, Problem *o)
 static PetscErrorCode Solve(const Problem *o, int *status, double *kkt, double *error)
 {
   char *memory;
+  double rest[3] = {0};
   Work work;
   int its;
 
@@ -65,8 +75,7 @@ static PetscErrorCode Solve(const Problem *o, int *status, double *kkt, double *
   *kkt = *error = 1;
   PetscCall(PetscMalloc1(work_size(&o->model), &memory));
   place(&o->model, memory, &work);
-  work.f[0] = 1;
-  *status = predict(&o->model, &work, NULL, kkt, &its);
+  *status = advance(&o->model, &work, rest, 0, rest, NULL, kkt, &its);
   *error = 0;
   for (int i = 0; i < o->model.n_contacts; i++) *error = fmax(*error, fabs(work.z[o->model.n_motions + i] - o->L[i]));
   PetscCall(PetscFree(memory));
@@ -157,18 +166,17 @@ typedef struct {
   int calls;
 } Steps;
 
-static int Functions3(void *context, const double v[], double f[])
-{
-  Steps *s = (Steps *)context;
+static Steps steps;
+static double limited[] = {-1, 0, 0, VARIABLE, 1, END, VARIABLE, 0, END};
 
-  s->calls++;
-  if (s->last >= 0 && v[1] > s->last + s->most) return 1;
-  if (s->last >= 0 && fabs(v[0] - (2 + v[1])) > 1e-12) s->calls = 1000;
-  s->last = v[1];
-  f[0] = 1;
-  f[1] = v[1];
-  f[2] = v[0];
-  return 0;
+static double value_of(const double *code, const double v[], const double x[])
+{
+  if (*code >= 0) return library_value_of(code, v, x);
+  steps.calls++;
+  if (steps.last >= 0 && v[1] > steps.last + steps.most) return NAN;
+  if (steps.last >= 0 && fabs(v[0] - (2 + v[1])) > 1e-12) steps.calls = 1000;
+  steps.last = v[1];
+  return 1;
 }
 
 /* The law of the last step, of blocks of `rows` with the coefficient mu. */
@@ -202,9 +210,12 @@ static PetscErrorCode TestPaths(void)
   PetscFunctionBegin;
   for (int problem = 0; problem < 200; problem++) {
     const int rows = 2 + problem % 2;
-    Steps steps = {-1, problem % 4 ? 1 : 0.1, 0};
     Model m = {.n_parameters = 1,
+               .n_atoms = 3,
                .n_functions = 3,
+               .atom = first,
+               .function = function,
+               .code = limited,
                .n_places = N,
                .n_contacts = N,
                .n_stiffness = 1,
@@ -218,6 +229,7 @@ static PetscErrorCode TestPaths(void)
                .coefficient = coefficient,
                .normal = normal};
 
+    steps = (Steps){-1, problem % 4 ? 1 : 0.1, 0};
     for (int i = 0; i < N; i++) {
       for (int j = 0; j < N; j++) root[i][j] = Draw(&random);
       for (int j = 0; j <= i; j++) W[i * (i + 1) / 2 + j] = dot(N, root[i], root[j]) / N + (i == j ? 0.5 : 0);
@@ -238,7 +250,7 @@ static PetscErrorCode TestPaths(void)
       double work = 0;
 
       mu[0] = 2 + k / 4.;
-      CHECK(advance(&m, &o, Functions3, &steps, mu, k / 4., values, NULL, &kkt, &its) == OK && kkt < 1e-10,
+      CHECK(advance(&m, &o, mu, k / 4., values, NULL, &kkt, &its) == OK && kkt < 1e-10,
             "problem %d, step %d: residual %g", problem, k, kkt);
       PetscCall(CheckLaw(&o, rows, 0.3));
       for (int b = 0; b < m.n_slip; b++) work += state_of(&m, values).work[b];

@@ -278,34 +278,3 @@ NONE(FreeFMUState, void **state)
 NONE(SerializedFMUStateSize, void *state, size_t *size)
 NONE(SerializeFMUState, void *state, uint8_t bytes[], size_t size)
 NONE(DeserializeFMUState, const uint8_t bytes[], size_t size, void **state)
-
-/* The other interface types, for importers that look for all functions. */
-NONE(ActivateModelPartition, uint32_t clock, double time)
-NONE(CompletedIntegratorStep, bool past, bool *event, bool *terminate)
-MODE(EnterContinuousTimeMode)
-NONE(SetTime, double time)
-NONE(GetContinuousStates, double value[], size_t n)
-NONE(SetContinuousStates, const double value[], size_t n)
-NONE(GetContinuousStateDerivatives, double value[], size_t n)
-NONE(GetNominalsOfContinuousStates, double value[], size_t n)
-NONE(GetEventIndicators, double value[], size_t n)
-NONE(GetNumberOfContinuousStates, size_t *n)
-NONE(GetNumberOfEventIndicators, size_t *n)
-
-EXPORT void *fmi3InstantiateModelExchange(const char *name, const char *token, const char *resources, bool visible,
-                                          bool logging, void *environment, Log log);
-void *fmi3InstantiateModelExchange(const char *name, const char *token, const char *resources, bool visible,
-                                   bool logging, void *environment, Log log)
-{
-  return NULL;
-}
-
-EXPORT void *fmi3InstantiateScheduledExecution(const char *name, const char *token, const char *resources, bool visible,
-                                               bool logging, void *environment, Log log, void *update, void *lock,
-                                               void *unlock);
-void *fmi3InstantiateScheduledExecution(const char *name, const char *token, const char *resources, bool visible,
-                                        bool logging, void *environment, Log log, void *update, void *lock,
-                                        void *unlock)
-{
-  return NULL;
-}

@@ -20,10 +20,9 @@ typedef struct Output {
   int kind, of, n, width, first, weight; /* weight: place of the first in Model.weight; -1: all are 1, or as found */
 } Output;
 
-/* Places first .. first + n - 1, which have the flexibility C (n x n), times a value. */
+/* Places first .. first + n - 1, which have the flexibility (n x n) from `at` on in Model.flexibility, times a value. */
 typedef struct {
-  int first, n, value;
-  DATA double *C;
+  int first, n, value, at;
 } Block;
 
 enum { PRESCRIBED = -1, UNKNOWN = -2 };     /* instead of a place: moved by a support; not among the model's unknowns */
@@ -37,41 +36,47 @@ typedef struct {
 /* The contacts first .. first + n - 1: the nodes of a surface with their masters on another. */
 typedef struct {
   PetscInt slave, master, first, n;
-  double reach; /* of a master */
 } Facing;
 
+/* n_nodes 0: no surface moves. */
 typedef struct {
   PetscInt dim, n_nodes, nf, nq, n_searches, n_facets; /* nodes and points of a facet; of the largest master */
   double around;                                       /* 2 pi in an axisymmetric scene; 0 */
   DATA double *w, *N, *dN;                             /* nq; nq x nf; nq x nf x 2 */
   DATA Surface *surface;
   DATA Facing *search;
-  DATA PetscInt *facet, *border, *node; /* node: of each slave */
+  DATA double *reach;                    /* by search: of a master */
+  DATA PetscInt *facet, *border, *slave; /* slave: the node of each */
   DATA PetscBool *at_border;
   DATA int *place, *given; /* n_nodes x dim; given: the value that is a prescribed displacement; -1: it is 0 */
   DATA int *pose;          /* by node: the first of nine values that turn its body; -1: none */
+  DATA int *body, *map;    /* by node; by body and axis: the expression of its map in Model.code, -1: none */
+  DATA double *drawn;      /* the nodes as drawn, n_nodes x 3 */
 } Surfaces;
 
 typedef struct {
-  int n_parameters, n_functions, n_motions, n_places, n_stiffness, n_values, n_terms, n_outputs;
-  int n_contacts, n_blocks; /* n_places contacts, and no blocks, unless surfaces move */
-  int areas;                /* of contacts: the first of their values, unless surfaces move */
-  double tolerance;         /* of the KKT residual */
-  DATA double *offset;      /* n_motions + n_places + n_values rows of n_functions: w and the values for z = 0 */
-  DATA int *stiffness;      /* functions by which the next two are multiplied, n_stiffness of each */
-  DATA double *W, *A;       /* lower triangle of n_places rows, where there are no blocks; n_motions x n_places */
-  DATA int *value, *factor; /* of n_terms: the value to which it adds, and its function */
-  DATA double *term;        /* (n_motions + n_places) x n_terms */
+  int n_parameters, n_atoms, n_functions, n_motions, n_places, n_stiffness, n_values, n_terms, n_outputs;
+  int n_contacts, n_blocks;  /* n_places contacts, and no blocks, unless surfaces move */
+  int areas;                 /* of contacts: the first of their values, unless surfaces move */
+  int n_slip, n_tables;      /* blocks of contacts with friction, with the others; tables of a history */
+  double tolerance;          /* of the KKT residual */
+  DATA double *code;         /* expressions */
+  DATA int *atom, *function; /* the expressions of the parameters, in code; n_functions x 4: see product() */
+  DATA double *offset;       /* n_motions + n_places + n_values rows of n_functions: w and the values for z = 0 */
+  DATA int *stiffness;       /* functions by which the next two are multiplied, n_stiffness of each */
+  DATA double *W, *A;        /* lower triangle of n_places rows, where there are no blocks; n_motions x n_places */
+  DATA int *value, *factor;  /* of n_terms: the value to which it adds, and its function */
+  DATA double *term;         /* (n_motions + n_places) x n_terms */
   DATA Output *output;
   DATA int *contact;
   DATA double *weight;
   DATA Block *block;
-  const Surfaces *surfaces; /* NULL: none moves */
-  /* of paths; with friction (n_slip > 0) contacts are rows, in blocks of a normal and its tangents */
-  int n_slip, n_tables;
+  DATA double *flexibility;
+  Surfaces surfaces;
   DATA int *row, *coefficient; /* by block: its first row, with the end; the value that is its coefficient, -1: 0 */
   DATA int *normal;            /* by row: it is one; NULL: all are */
-  const HycoTimeTable *table;
+  DATA int *table;             /* by table: its first row, with the end; rows: */
+  DATA double *table_t, *table_value;
 } Model;
 
 /* What a step leaves for the next; of doubles alone, in the caller's memory. */

@@ -1,5 +1,5 @@
 /*
-  Paths in time, of elastic bodies. A step with friction is w = q + M z as in runtime.c, with rows for the tangents of a
+  Paths in time, of elastic bodies; a prediction without a history is a step from rest. A step with friction is w = q + M z as in runtime.c, with rows for the tangents of a
   contact after that of its normal, whose w is the slip of the step: q has where the tangents were before. With Coulomb's
   projection P of the library, F(z) = z - P(z - rho w) = 0 is solved by Newton's method with a search along its steps.
 */
@@ -40,24 +40,21 @@ static size_t path_ints(const Model *m)
   return m->n_slip ? 2 * (size_t)(m->n_motions + m->n_contacts) : 0;
 }
 
-static void place_path(const Model *m, double *next, int *ints, Work *o)
+static void place_path(const Model *m, double **next, Work *o)
 {
   const size_t n = m->n_slip ? (size_t)(m->n_motions + m->n_contacts) : 0;
 
-  o->s = NULL;
-  o->J = take(&next, n * n);
-  o->rho = take(&next, n);
-  o->from = take(&next, n);
-  o->from_next = take(&next, n);
-  o->aimed = take(&next, n);
-  o->trial = take(&next, n);
-  o->trial_w = take(&next, n);
-  o->rhs = take(&next, n);
-  o->D = take(&next, 9 * (size_t)m->n_slip);
-  o->v = take(&next, 2 * (size_t)m->n_parameters + 1 + (size_t)m->n_tables);
-  o->saved = take(&next, state_size(m));
-  o->unknown = ints;
-  o->pivot = ints + n;
+  o->J = take(next, n * n);
+  o->rho = take(next, n);
+  o->from = take(next, n);
+  o->from_next = take(next, n);
+  o->aimed = take(next, n);
+  o->trial = take(next, n);
+  o->trial_w = take(next, n);
+  o->rhs = take(next, n);
+  o->D = take(next, 9 * (size_t)m->n_slip);
+  o->v = take(next, 2 * (size_t)m->n_parameters + 1 + (size_t)m->n_tables);
+  o->saved = take(next, state_size(m));
 }
 
 /* w = q + M z. */
@@ -88,6 +85,7 @@ static void set_scales(const Model *m, Work *o)
   const int p = m->n_motions, n = m->n_contacts;
   double most = 0;
 
+  make_columns(m, o, 1);
   for (int i = 0; i < p; i++) {
     o->rho[i] = 0;
     for (int j = 0; j < n; j++) o->rho[i] = fmax(o->rho[i], fabs(o->A[(size_t)i * (size_t)n + (size_t)j]));
@@ -125,22 +123,6 @@ static double measure(const Model *m, Work *o, const double z[], const double w[
   return sqrt(sum);
 }
 
-/* Whether a force at row i, or a motion, moves it, of those of its block. */
-static int flexible(const Model *m, Work *o, int k, int i)
-{
-  const size_t n = (size_t)m->n_contacts;
-  double most = 0, own = 0;
-
-  for (int r = m->row[k]; r < m->row[k + 1]; r++) {
-    double moves = column(m, o, (size_t)r)[r];
-
-    for (size_t c = 0; c < (size_t)m->n_motions; c++) moves = fmax(moves, fabs(o->A[c * n + (size_t)r]));
-    most = fmax(most, moves);
-    if (r == i) own = moves;
-  }
-  return own > 1e-12 * most;
-}
-
 /* The unknowns on the pieces of P at y (stick: all contacts stick): rows of DP, o->D by block, that are not 0; `aimed` is z
    with 0 in the others. Returns their number. */
 static int find_unknowns(const Model *m, Work *o, const double z[], int stick)
@@ -158,14 +140,12 @@ static int find_unknowns(const Model *m, Work *o, const double z[], int stick)
     law(m, o, k, data);
     HycoCoulombDerivative(rows, data, o->from + p + first, D);
     for (int i = 0; i < rows; i++) {
-      const int held = i && !flexible(m, o, k, first + i);
       double size = 0;
 
       for (int j = 0; j < rows; j++) {
         if (stick) D[rows * i + j] = i == j;
-        if (held) D[rows * i + j] = D[rows * j + i] = 0;
+        size += fabs(D[rows * i + j]);
       }
-      for (int j = 0; j < rows; j++) size += fabs(D[rows * i + j]);
       if (size > 0)
         o->unknown[count++] = p + first + i;
       else
@@ -368,7 +348,7 @@ static void close_gaps(const Model *m, Work *o)
    no forces if no load acts on them. */
 static int from_forces(const Model *m, Work *o, int *iterations)
 {
-  const State *s = o->s;
+  const State *s = &o->s;
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
   const double ratio = *s->taken > 1 && p == 0 ? (o->t - *s->t) / (*s->t - *s->t_before) : 0;
   double given, size;
@@ -396,7 +376,7 @@ static double solve_slip(const Model *m, Work *o, int *iterations)
 
   set_scales(m, o);
   for (int k = 0; k < m->n_slip; k++) {
-    for (int i = m->row[k] + 1; i < m->row[k + 1]; i++) o->q[p + (size_t)i] += o->s->place[i];
+    for (int i = m->row[k] + 1; i < m->row[k + 1]; i++) o->q[p + (size_t)i] += o->s.place[i];
   }
   if (!from_forces(m, o, iterations) && !(solve(m, o, iterations) <= m->tolerance && iterate(m, o, iterations))) {
     memset(o->z, 0, (p + n) * sizeof(double));
@@ -415,7 +395,7 @@ static double solve_slip(const Model *m, Work *o, int *iterations)
 /* The step's end is the next one's begin. */
 static void accept(const Model *m, Work *o)
 {
-  const State *s = o->s;
+  const State *s = &o->s;
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
   double most = 0;
 
@@ -440,50 +420,48 @@ static void accept(const Model *m, Work *o)
   }
 }
 
-/* f at the variables: parameters, time, tables; 0: done. */
-typedef int (*Functions)(void *context, const double v[], double f[]);
-
 /* One step to t. */
-static int try_step(const Model *m, Work *o, Functions functions_at, void *context, const double mu[], double t,
-                    const State *s, double out[], double *kkt, int *iterations)
+static int try_step(const Model *m, Work *o, const double mu[], double t, double out[], double *kkt, int *iterations)
 {
   memcpy(o->v, mu, (size_t)m->n_parameters * sizeof(double));
   o->v[m->n_parameters] = t;
-  for (int k = 0; k < m->n_tables; k++) o->v[m->n_parameters + 1 + k] = HycoTableValue(&m->table[k], t);
-  if (functions_at(context, o->v, o->f)) return DIVERGED;
-  o->s = s;
+  for (int k = 0; k < m->n_tables; k++) {
+    const int first = m->table[k];
+
+    o->v[m->n_parameters + 1 + k] =
+        HycoTableValue(&(HycoTimeTable){m->table[k + 1] - first, m->table_t + first, m->table_value + first}, t);
+  }
   o->t = t;
-  return predict(m, o, out, kkt, iterations);
+  return predict(m, o, o->v, out, kkt, iterations);
 }
 
 /* From the state's time to t, where the parameters are mu; until there they go on a straight line. Steps end at the rows of
    tables, and are halved where they have no solution. The state is as before if there is none. */
-static int advance(const Model *m, Work *o, Functions functions_at, void *context, const double mu[], double t,
-                   double state[], double out[], double *kkt, int *iterations)
+static int advance(const Model *m, Work *o, const double mu[], double t, double state[], double out[], double *kkt,
+                   int *iterations)
 {
-  const State s = state_of(m, state);
-  const double begin = *s.t, whole = t - begin;
-  double now = begin, dt = whole, *mu_of = o->v + m->n_parameters + 1 + m->n_tables;
+  double *mu_of = o->v + m->n_parameters + 1 + m->n_tables, begin, whole, now, dt;
   int status = DIVERGED;
 
+  o->s = state_of(m, state);
+  now = begin = *o->s.t;
+  dt = whole = t - begin;
   *kkt = HUGE_VAL;
   *iterations = 0;
   for (int i = 0; i < m->n_outputs; i++) out[i] = NAN;
   memcpy(o->saved, state, state_size(m) * sizeof(double));
   /* At first all loads act at once, from rest. */
-  if (*s.taken == 0) status = try_step(m, o, functions_at, context, mu, t, &s, out, kkt, iterations);
+  if (*o->s.taken == 0) status = try_step(m, o, mu, t, out, kkt, iterations);
   while (*o->saved > 0 && now < t) {
     double stop = t, to;
 
-    for (int k = 0; k < m->n_tables; k++) {
-      for (int i = 0; i < m->table[k].n; i++) {
-        if (m->table[k].t[i] > now) stop = fmin(stop, m->table[k].t[i]);
-      }
+    for (int i = 0; i < (m->n_tables ? m->table[m->n_tables] : 0); i++) {
+      if (m->table_t[i] > now) stop = fmin(stop, m->table_t[i]);
     }
     to = now + dt < stop ? now + dt : stop;
     for (int i = 0; i < m->n_parameters; i++)
       mu_of[i] = to < t ? o->saved[3 + i] + (mu[i] - o->saved[3 + i]) * ((to - begin) / whole) : mu[i];
-    status = try_step(m, o, functions_at, context, mu_of, to, &s, out, kkt, iterations);
+    status = try_step(m, o, mu_of, to, out, kkt, iterations);
     if (status == OK) {
       now = to;
       dt *= 2;

@@ -9,71 +9,53 @@
   the surfaces, of which the contacts' rows B make those of the contacts: L acts by B^T L, W is the sum over the bodies of
   B_b C_b B_b^T.
 */
+#include "expression.h"
 #include "model.h"
 #include "surfaces.c"
 
 /* Arrays in the caller's memory. */
 typedef struct {
-  double *f, *q, *w, *z, *value; /* functions; n_motions + n_contacts; values */
+  double *atom, *f, *q, *w, *z, *value; /* expressions and functions; n_motions + n_contacts; values */
   /* W: columns, as far as they are made. L: factor of W on the closed contacts, in rows of n_contacts; V = L^-1 A^T; S: of
      V^T V */
   double *W, *A, *L, *V, *S, *last, *y;
   double pin; /* of A^T (q_x + A L), which is 0, in w_L: a body's pins have no flexibility of their own */
   double *at_places, *push, *sum; /* n_motions + n_places: w for z = 0, z; n_terms */
-  int *closed, *at, *made,
+  int *closed, *at, *list, *made,
       n_closed;          /* by contact: 0, open; 2, one of the next; the closed ones, rows of L; of W's columns */
   Met *met;              /* by contact; of moved surfaces, like */
   int *touched, *before; /* places of moved surfaces that rows have; by place: how many of these precede it */
   Room room;
-#if defined(PATHS)
   /* p + n: scales; y = z - rho w at the step's begin, and where it is measured; where Newton's step ends; trials; the right
      side */
   double *rho, *from, *from_next, *aimed, *trial, *trial_w, *rhs;
   double *D, *J, *v, *saved,
       largest; /* by block; of unknowns; variables, then parameters on the way; a state; a force */
   int *unknown, *pivot;
-  double t;       /* the step's end */
-  const State *s; /* its begin, and then its end */
-#endif
+  double t; /* the step's end */
+  State s;  /* its begin, and then its end */
 } Work;
 
-#if defined(PATHS)
 static size_t path_doubles(const Model *m);
 static size_t path_ints(const Model *m);
-static void place_path(const Model *m, double *next, int *ints, Work *o);
+static void place_path(const Model *m, double **next, Work *o);
 static double solve_slip(const Model *m, Work *o, int *iterations);
 static void accept(const Model *m, Work *o);
-#endif
-
-/* The number of doubles in a Work. */
-static size_t work_doubles(const Model *m)
-{
-  const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts, places = (size_t)m->n_places;
-  const size_t nodes = m->surfaces ? (size_t)m->surfaces->n_nodes : 0,
-               facets = m->surfaces ? (size_t)m->surfaces->n_facets : 0;
-
-  return (size_t)m->n_functions + (size_t)m->n_values + (size_t)m->n_terms + 4 * (p + n) + 2 * (p + places) +
-         2 * n * n + 2 * p * n + p * p + n + 7 * nodes + 3 * facets
-#if defined(PATHS)
-         + path_doubles(m)
-#endif
-      ;
-}
 
 /* The largest members come first, so that all are aligned. */
 static size_t work_size(const Model *m)
 {
-  const Surfaces *s = m->surfaces;
-  const size_t moved = s ? (size_t)m->n_contacts * sizeof(Met) + (size_t)s->n_facets * sizeof(HycoPoint) +
-                               (size_t)HycoPatchesBoxes(s->n_facets) * sizeof(HycoBox)
-                         : 0;
+  const Surfaces *s = &m->surfaces;
+  const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts, places = (size_t)m->n_places,
+               nodes = (size_t)s->n_nodes, facets = (size_t)s->n_facets;
+  const size_t doubles = (size_t)(m->n_atoms + m->n_functions + m->n_values + m->n_terms) + 4 * (p + n) +
+                         2 * (p + places) + 2 * n * n + 2 * p * n + p * p + n + 7 * nodes + 3 * facets +
+                         path_doubles(m);
+  const size_t moved =
+      nodes ? n * sizeof(Met) + facets * sizeof(HycoPoint) + (size_t)HycoPatchesBoxes(s->n_facets) * sizeof(HycoBox)
+            : 0;
 
-  size_t ints = 3 * (size_t)m->n_contacts + (s ? 2 * (size_t)m->n_places + 1 : 0);
-
-#if defined(PATHS)
-  ints += path_ints(m);
-#endif
-  return work_doubles(m) * sizeof(double) + moved + ints * sizeof(int);
+  return doubles * sizeof(double) + moved + (4 * n + 2 * places + 1 + path_ints(m)) * sizeof(int);
 }
 
 static double *take(double **from, size_t n)
@@ -88,11 +70,10 @@ static double *take(double **from, size_t n)
 static void place(const Model *m, void *memory, Work *o)
 {
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts, places = (size_t)m->n_places;
-  const Surfaces *s = m->surfaces;
+  const Surfaces *s = &m->surfaces;
   double *next = memory;
 
-  o->met = NULL;
-  o->room.X = NULL;
+  o->atom = take(&next, (size_t)m->n_atoms);
   o->f = take(&next, (size_t)m->n_functions);
   o->value = take(&next, (size_t)m->n_values);
   o->q = take(&next, p + n);
@@ -108,26 +89,25 @@ static void place(const Model *m, void *memory, Work *o)
   o->at_places = take(&next, p + places);
   o->push = take(&next, p + places);
   o->sum = take(&next, (size_t)m->n_terms);
-  if (s) {
-    o->room.X = take(&next, 3 * (size_t)s->n_nodes);
-    o->room.outward = take(&next, 3 * (size_t)s->n_nodes);
-    o->room.area = take(&next, (size_t)s->n_nodes);
-    o->room.normal = take(&next, 3 * (size_t)s->n_facets);
-    o->met = (Met *)(void *)next;
+  o->room.X = take(&next, 3 * (size_t)s->n_nodes);
+  o->room.outward = take(&next, 3 * (size_t)s->n_nodes);
+  o->room.area = take(&next, (size_t)s->n_nodes);
+  o->room.normal = take(&next, 3 * (size_t)s->n_facets);
+  place_path(m, &next, o);
+  o->met = (Met *)(void *)next;
+  if (s->n_nodes) {
     o->room.item = (HycoPoint *)(void *)(o->met + n);
     o->room.box = (HycoBox *)(void *)(o->room.item + s->n_facets);
     next = (double *)(void *)(o->room.box + HycoPatchesBoxes(s->n_facets));
   }
-#if defined(PATHS)
-  o->closed = (int *)(void *)(next + path_doubles(m));
-  place_path(m, next, o->closed + 3 * n, o);
-#else
   o->closed = (int *)(void *)next;
-#endif
   o->at = o->closed + n;
-  o->made = o->at + n;
-  o->touched = s ? o->made + n : NULL;
-  o->before = s ? o->touched + places : NULL;
+  o->list = o->at + n;
+  o->made = o->list + n;
+  o->touched = o->made + n;
+  o->before = o->touched + places;
+  o->unknown = o->before + places + 1;
+  o->pivot = o->unknown + path_ints(m) / 2;
 }
 
 /* Four sums, which a compiler may add side by side. */
@@ -144,9 +124,14 @@ static double dot(size_t n, const double a[], const double b[])
 }
 
 /* to += factor from. */
-static void add(size_t n, double factor, const double from[], double to[])
+static void add(size_t n, double factor, const double *restrict from, double *restrict to)
 {
-  for (size_t i = 0; i < n; i++) to[i] += factor * from[i];
+  size_t i = 0;
+
+  for (; i + 4 <= n; i += 4) {
+    for (size_t k = 0; k < 4; k++) to[i + k] += factor * from[i + k];
+  }
+  for (; i < n; i++) to[i] += factor * from[i];
 }
 
 /* W of contact a by those at places: y = the sum of C_b B_b^T over the bodies, then B y. */
@@ -156,7 +141,7 @@ static void fill_moved(const Model *m, const Work *o, const Met *a, double y[], 
   for (int e = 0; e < a->n; e++) {
     for (const Block *b = m->block; b < m->block + m->n_blocks; b++) {
       const int row = a->place[e] - b->first;
-      const double factor = a->value[e] * o->value[b->value], *C = b->C;
+      const double factor = a->value[e] * o->value[b->value], *C = m->flexibility + b->at;
 
       if (row < 0 || row >= b->n) continue;
       C += (size_t)row * (size_t)b->n;
@@ -174,23 +159,35 @@ static void fill_moved(const Model *m, const Work *o, const Met *a, double y[], 
   }
 }
 
-/* W of contact a with all; made when it is needed first. */
-static const double *column(const Model *m, Work *o, size_t a)
+/* W with all contacts of those that are closed, or of all. Where rows are fixed the triangles are read in the order of memory. */
+static void make_columns(const Model *m, Work *o, int all)
 {
   const size_t n = (size_t)m->n_contacts, size = n * (n + 1) / 2;
-  double *w = o->W + a * n;
+  int k = 0, done = 0;
 
-  if (o->made[a]) return w;
-  o->made[a] = 1;
-  memset(w, 0, n * sizeof(double));
-  if (m->surfaces) fill_moved(m, o, &o->met[a], o->push + m->n_motions, w);
-  for (size_t s = 0; s < (size_t)m->n_stiffness && !m->surfaces; s++) {
-    const double factor = o->f[m->stiffness[s]], *W = m->W + s * size;
-
-    add(a + 1, factor, W + a * (a + 1) / 2, w);
-    for (size_t i = a + 1; i < n; i++) w[i] += factor * W[i * (i + 1) / 2 + a];
+  for (int i = 0; i < m->n_contacts; i++) {
+    if (o->made[i] || !(all || o->closed[i])) continue;
+    o->made[i] = 1;
+    o->list[k++] = i;
+    if (m->surfaces.n_nodes) fill_moved(m, o, &o->met[i], o->push + m->n_motions, o->W + (size_t)i * n);
   }
-  return w;
+  for (size_t i = 0; i < n && k && !m->surfaces.n_nodes; i++) {
+    const int is = done < k && (size_t)o->list[done] == i;
+
+    done += is;
+    if (!done) continue;
+    memset(o->y, 0, (i + 1) * sizeof(double));
+    for (size_t s = 0; s < (size_t)m->n_stiffness; s++)
+      add(i + 1, o->f[m->stiffness[s]], m->W + s * size + i * (i + 1) / 2, o->y);
+    for (int j = 0; j < done; j++) o->W[(size_t)o->list[j] * n + i] = o->y[o->list[j]];
+    if (is) memcpy(o->W + i * n, o->y, i * sizeof(double));
+  }
+}
+
+/* W of contact a with all, which is made. */
+static const double *column(const Model *m, const Work *o, size_t a)
+{
+  return o->W + a * (size_t)m->n_contacts;
 }
 
 /* The places that contacts touch. */
@@ -210,12 +207,26 @@ static void find_touched(const Model *m, Work *o)
   }
 }
 
+/* The functions, and the nodes of moved surfaces, at the variables. */
+static void set_variables(const Model *m, Work *o, const double v[])
+{
+  const Surfaces *s = &m->surfaces;
+
+  for (int k = 0; k < m->n_atoms; k++) o->atom[k] = value_of(m->code + m->atom[k], v, NULL);
+  for (int k = 0; k < m->n_functions; k++) o->f[k] = product(m->function + 4 * k, o->atom);
+  for (PetscInt i = 0; i < 3 * s->n_nodes; i++) {
+    const int map = s->map[3 * s->body[i / 3] + i % 3];
+
+    o->room.X[i] = map < 0 ? s->drawn[i] : value_of(m->code + map, v, s->drawn + i - i % 3);
+  }
+}
+
 /* The values for z = 0, and q and A of the contacts at the functions' values; 0: the model does not know a node. */
 static int assemble(const Model *m, Work *o)
 {
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts, places = (size_t)m->n_places,
                d = (size_t)m->n_functions;
-  const Surfaces *s = m->surfaces;
+  const Surfaces *s = m->surfaces.n_nodes ? &m->surfaces : NULL;
   double *q = s ? o->at_places : o->q;
 
   for (size_t i = 0; i < p + places; i++) q[i] = dot(d, m->offset + i * d, o->f);
@@ -331,6 +342,7 @@ static size_t arrange(const Model *m, Work *o)
   size_t same = (size_t)o->n_closed;
   int k = 0;
 
+  make_columns(m, o, 0);
   for (int i = 0; i < o->n_closed; i++) {
     if (o->closed[o->at[i]])
       o->at[k++] = o->at[i];
@@ -468,8 +480,8 @@ static void start(const Model *m, Work *o)
 
   for (int i = 0; i < m->n_contacts; i++) least = is_normal(m, (size_t)i) ? fmin(least, o->q[m->n_motions + i]) : least;
   for (int i = 0; i < m->n_contacts; i++)
-    o->closed[i] =
-        is_normal(m, (size_t)i) && (m->n_motions > 0 ? !o->met || o->met[i].n : o->q[i] < 0 && o->q[i] <= least / 2);
+    o->closed[i] = is_normal(m, (size_t)i) &&
+                   (m->n_motions > 0 ? !m->surfaces.n_nodes || o->met[i].n : o->q[i] < 0 && o->q[i] <= least / 2);
   o->n_closed = 0;
   for (int i = 0; i < m->n_motions + m->n_contacts; i++) o->last[i] = 0;
 }
@@ -522,6 +534,7 @@ static double search_held(const Model *m, Work *o, int *iterations)
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
   double epsilon = 0, delta = 0, kkt = HUGE_VAL;
 
+  make_columns(m, o, 1);
   for (size_t i = 0; i < n; i++) delta = fmax(delta, 1e-8 * column(m, o, i)[i]);
   for (size_t i = 0; i < p * n; i++) epsilon = fmax(epsilon, 1e-2 * o->A[i] * o->A[i] * (1e-8 / delta));
   start(m, o);
@@ -553,11 +566,11 @@ static void evaluate(const Model *m, Work *o)
   double *push = o->push + p;
 
   memcpy(o->push, o->z, p * sizeof(double));
-  if (m->surfaces)
+  if (m->surfaces.n_nodes)
     memset(push, 0, (size_t)m->n_places * sizeof(double));
   else
     memcpy(push, o->z + p, (size_t)m->n_places * sizeof(double));
-  for (int k = 0; k < m->n_contacts && m->surfaces; k++) {
+  for (int k = 0; k < m->n_contacts && m->surfaces.n_nodes; k++) {
     for (int e = 0; e < o->met[k].n; e++) push[o->met[k].place[e]] += o->z[p + (size_t)k] * o->met[k].value[e];
   }
   memset(o->sum, 0, n * sizeof(double));
@@ -616,7 +629,7 @@ static double resultant(const Model *m, const Work *o, const Output *q, int i)
 {
   const int k = m->contact[q->first + i], a = q->of % 3, b = (q->of + 1) % 3, c = (q->of + 2) % 3;
   const Met *met = &o->met[k];
-  const double *weight = m->weight + q->weight, *x = o->room.X + 3 * m->surfaces->node[k];
+  const double *weight = m->weight + q->weight, *x = o->room.X + 3 * m->surfaces.slave[k];
   double share = weight[i];
 
   for (int j = 0; j < met->n_masters; j++) share -= met->weight[j] * weight[q->n + met->master[j]];
@@ -633,18 +646,14 @@ static double output(const Model *m, const Work *o, const Output *q, double leas
   for (int i = 0; i < q->n; i++) {
     const double weight = q->weight < 0 ? 1 : m->weight[q->weight + i];
 
-#if defined(PATHS)
     if (q->kind == WORK) {
-      sum += o->s->work[m->contact[q->first + i]];
-      continue;
-    }
-#endif
-    if (q->kind == RESULTANT) {
+      sum += o->s.work[m->contact[q->first + i]];
+    } else if (q->kind == RESULTANT) {
       if (o->z[m->n_motions + m->contact[q->first + i]] > least) sum += resultant(m, o, q, i);
     } else if (q->kind >= CLOSED) {
       const int k = m->contact[q->first + i];
       const double force = k < 0 ? 0 : o->z[m->n_motions + k];
-      const double area = k < 0 ? 0 : o->met ? o->met[k].area : o->value[m->areas + k];
+      const double area = k < 0 ? 0 : m->surfaces.n_nodes ? o->met[k].area : o->value[m->areas + k];
       const double pressure = force > least && area > 0 ? force / area : 0;
 
       if (q->kind == CLOSED) sum += force > least ? area : 0;
@@ -659,29 +668,21 @@ static double output(const Model *m, const Work *o, const Output *q, double leas
   return sum == HUGE_VAL ? 0 : sum;
 }
 
-/* The prediction for the functions' values in o->f, and the nodes of moved surfaces in o->room.X. Residuals say whether it is
-   solved. */
-static int predict(const Model *m, Work *o, double out[], double *kkt, int *iterations)
+/* The step of the state o->s to the variables v, which have the time o->t. Residuals say whether it is solved. */
+static int predict(const Model *m, Work *o, const double v[], double out[], double *kkt, int *iterations)
 {
   double least = 0;
 
-  *iterations = 0;
   *kkt = HUGE_VAL;
   for (int i = 0; i < m->n_outputs; i++) out[i] = NAN;
+  set_variables(m, o, v);
   if (!assemble(m, o)) return DIVERGED;
   /* fmax() passes over what is not a number: a residual of such gaps would be 0. */
   for (int i = 0; i < m->n_motions + m->n_contacts; i++) {
     if (!isfinite(o->q[i])) return DIVERGED;
   }
-#if defined(PATHS)
-  if (m->n_slip)
-    *kkt = solve_slip(m, o, iterations);
-  else
-#endif
-    *kkt = solve(m, o, iterations);
-#if defined(PATHS)
-  if (o->s && *kkt <= m->tolerance) accept(m, o);
-#endif
+  *kkt = m->n_slip ? solve_slip(m, o, iterations) : solve(m, o, iterations);
+  if (*kkt <= m->tolerance) accept(m, o);
   /* 1e-10 of the largest force. */
   for (int i = 0; i < m->n_contacts; i++)
     least = is_normal(m, (size_t)i) ? fmax(least, 1e-10 * o->z[m->n_motions + i]) : least;

@@ -95,13 +95,13 @@ static int meet(const Surfaces *s, const Facing *h, const Room *r, const double 
   t.border = (PetscInt *)s->border + master->border;
   t.at_border = (PetscBool *)s->at_border + master->at_border;
   for (PetscInt k = h->first; k < h->first + h->n; k++) {
-    const PetscInt of = s->node[k];
+    const PetscInt of = s->slave[k];
     HycoProjection at;
     Met *m = &met[k];
 
     HycoMasterSearchProject(&t, of, PETSC_FALSE, &at);
-    if (at.n &&
-        (at.distance > h->reach || (HycoMasterSearchIsBeside(&t, of, &at) && HycoMasterSearchOnBorder(&t, &at))))
+    if (at.n && (at.distance > s->reach[h - s->search] ||
+                 (HycoMasterSearchIsBeside(&t, of, &at) && HycoMasterSearchOnBorder(&t, &at))))
       at.n = 0;
     m->n = 0;
     m->gap = 0;
