@@ -88,7 +88,7 @@ void HycoConeFactorGetPieces(HycoConeFactor factor, PetscInt *n, const PetscReal
 typedef struct {
   PetscInt n, p;
   const PetscReal *M, *q;
-  PetscBool symmetric;
+  PetscBool symmetric, springs; /* springs: the block of the free unknowns is that of springs, not round-off */
   HycoSetFactor factor;
   const HycoBlocks *blocks;
   HycoConeFactor cone; /* of HYCO_TAO_CONES types; NULL: none is kept */

@@ -25,6 +25,8 @@ PetscErrorCode HycoDirectDestroy(HycoDirect *direct);
 PetscErrorCode HycoDirectPinKernel(HycoDirect direct, Mat K);
 /* The same for n given unknowns of K, ascending. */
 PetscErrorCode HycoDirectPin(HycoDirect direct, PetscInt n, const PetscInt pinned[]);
+/* Those unknowns. Borrowed. */
+const PetscInt *HycoDirectPinned(HycoDirect direct);
 /* Orders and analyses [K Bt; B 0] (B and Bt may be NULL) unless the pattern is the last one's; bytes: the estimated
    memory of the factor on all ranks together. */
 PetscErrorCode HycoDirectAnalyse(HycoDirect direct, Mat K, Mat Bt, Mat B, PetscBool symmetric, PetscReal *bytes);
@@ -47,7 +49,9 @@ PetscErrorCode HycoDirectSolve(HycoDirect direct, Vec r, Vec x);
 /* Dimension of the null space attached to K (0: none is attached). */
 PetscErrorCode HycoKernelSize(Mat K, PetscInt *n);
 /* That many unknowns, ascending, without which K is regular; the same on every rank. Collective. */
-PetscErrorCode HycoKernelPins(MPI_Comm comm, Mat K, PetscInt n, PetscInt pinned[]);
+PetscErrorCode HycoKernelPins(Mat K, PetscInt n, PetscInt pinned[]);
+/* The same for n orthonormal motions v. */
+PetscErrorCode HycoMotionPins(PetscInt n, const Vec v[], PetscInt pinned[]);
 /*
   The work of the forces F - b (b: NULL for 0) on K's null space, which no K x balances: the largest |z.(F - b)| of its
   vectors z, relative to |z|.(|F| + |b|), or to 1e-2 |z| max(|F|, |b|) if that is more; 0 without a null space. Left out

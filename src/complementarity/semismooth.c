@@ -37,9 +37,10 @@
 #define TINY_STEP   (1. / 65536) /* where no longer one decreases |F| */
 #define MARGIN      1e-6         /* of tangential forces: nearer to the border of the cone a contact may slip */
 #define MOST_SOFT   12           /* motions on soft supports: of two bodies */
-#define SOFT        1e-2         /* of the largest flexibility: what is left without them */
-#define CLOSE       0.1          /* |F| relative to the forces: Newton's method is tried from a proximal step */
-#define MOST_ALL    200          /* iterations of all starts after which no proximal step begins */
+#define STIFFER     1e-4 /* springs of motions in units of a contact's stiffness: they move no force, and hold */
+#define SOFT        1e-2 /* of the largest flexibility: what is left without them */
+#define CLOSE       0.1  /* |F| relative to the forces: Newton's method is tried from a proximal step */
+#define MOST_ALL    200  /* iterations of all starts after which no proximal step begins */
 
 typedef struct {
   const HycoLCP *lcp;
@@ -568,6 +569,8 @@ static PetscErrorCode FromNormal(Newton *h, PetscReal z[], HycoLCPStatus *status
     forces[j] = 0;
     for (PetscInt i = 0; i < m; i++)
       M[(size_t)j * (size_t)m + (size_t)i] = h->M[(size_t)row[j] * (size_t)h->n + (size_t)row[i]];
+    /* What soft springs alone resist without friction must not run far away: it is of no use to the start. */
+    if (j < p && h->lcp->springs) M[(size_t)j * (size_t)(m + 1)] += STIFFER * h->flexibility;
   }
   /* Floating bodies start with all contacts closed (semidefinite.c); others from the contacts with a force. */
   for (PetscInt k = 0; k < b->n; k++) active[k] = (PetscBool)(p > 0 || z[row[k]] > 0);
@@ -770,7 +773,7 @@ struct _n_HycoConeFactor {
 };
 
 /* Rows and columns of the free unknowns times a typical flexibility: M stays [0 A; -A^T W] in structure. Once for an M. */
-static PetscErrorCode ScaleMatrix(HycoConeFactor f, PetscInt p, PetscInt n, const PetscReal M[])
+static PetscErrorCode ScaleMatrix(HycoConeFactor f, PetscInt p, PetscInt n, const PetscReal M[], PetscBool springs)
 {
   const size_t N = (size_t)n;
   PetscReal most = 0;
@@ -782,7 +785,7 @@ static PetscErrorCode ScaleMatrix(HycoConeFactor f, PetscInt p, PetscInt n, cons
   f->flexibility = most > 0 ? most : 1;
   for (size_t i = 0; i < (size_t)p; i++) {
     /* Of rigid motions: round-off, by which a body that slides away would find a load. */
-    for (size_t j = 0; j < (size_t)p; j++) f->scaled[i * N + j] = 0;
+    for (size_t j = 0; j < (size_t)p && !springs; j++) f->scaled[i * N + j] = 0;
     for (size_t j = 0; j < N; j++) f->scaled[i * N + j] *= f->flexibility;
     for (size_t j = 0; j < N; j++) f->scaled[j * N + i] *= f->flexibility;
   }
@@ -797,7 +800,7 @@ static PetscErrorCode ScaleFree(Newton *h, HycoConeFactor f, PetscReal z[])
   h->M0 = h->lcp->M;
   h->q0 = h->lcp->q;
   if (h->p) {
-    PetscCall(ScaleMatrix(f, h->p, h->n, h->lcp->M));
+    PetscCall(ScaleMatrix(f, h->p, h->n, h->lcp->M, h->lcp->springs));
     PetscCall(PetscMalloc1(h->n, &h->scaled));
     PetscCall(PetscArraycpy(h->scaled, h->q0, h->n));
     for (PetscInt i = 0; i < h->p; i++) {

@@ -90,6 +90,11 @@ PetscErrorCode HycoDirectPin(HycoDirect d, PetscInt n, const PetscInt pinned[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+const PetscInt *HycoDirectPinned(HycoDirect d)
+{
+  return d->pinned;
+}
+
 /* The unknowns of a singular K that become Schur variables. Collective. */
 PetscErrorCode HycoDirectPinKernel(HycoDirect d, Mat K)
 {
@@ -98,7 +103,7 @@ PetscErrorCode HycoDirectPinKernel(HycoDirect d, Mat K)
   PetscFunctionBegin;
   PetscCall(HycoKernelSize(K, &n));
   PetscCall(PetscMalloc1(n + 1, &pinned));
-  PetscCall(HycoKernelPins(d->comm, K, n, pinned));
+  PetscCall(HycoKernelPins(K, n, pinned));
   PetscCall(HycoDirectPin(d, n, pinned));
   PetscCall(PetscFree(pinned));
   PetscFunctionReturn(PETSC_SUCCESS);

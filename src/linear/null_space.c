@@ -20,16 +20,11 @@ PetscErrorCode HycoKernelSize(Mat K, PetscInt *n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* This rank's rows of the null space, row major. */
-static PetscErrorCode Rows(Mat K, PetscInt n, PetscInt *rows, PetscReal **row)
+/* This rank's rows of the n motions, row major. */
+static PetscErrorCode Rows(PetscInt n, const Vec v[], PetscInt *rows, PetscReal **row)
 {
-  MatNullSpace kernel;
-  const Vec *v;
-
   PetscFunctionBegin;
-  PetscCall(MatGetNullSpace(K, &kernel));
-  PetscCall(MatNullSpaceGetVecs(kernel, NULL, NULL, &v));
-  PetscCall(MatGetLocalSize(K, rows, NULL));
+  PetscCall(VecGetLocalSize(v[0], rows));
   /* An unknown's entries in all motions lie together: pivots are chosen by the length of such rows. */
   PetscCall(PetscMalloc1(*rows * n, row));
   for (PetscInt k = 0; k < n; k++) {
@@ -70,20 +65,20 @@ static PetscErrorCode Longest(MPI_Comm comm, PetscInt first, PetscInt rows, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* n unknowns, ascending, such that K without them is regular: pivots of the null space's rows. Collective. */
-PetscErrorCode HycoKernelPins(MPI_Comm comm, Mat K, PetscInt n, PetscInt pinned[])
+/* n unknowns, ascending, such that K without them is regular: pivots of the motions' rows. Collective. */
+PetscErrorCode HycoMotionPins(PetscInt n, const Vec v[], PetscInt pinned[])
 {
   PetscInt rows, first;
   PetscReal *row, *unit;
 
   PetscFunctionBegin;
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(MatGetOwnershipRange(K, &first, NULL));
-  PetscCall(Rows(K, n, &rows, &row));
+  PetscCall(VecGetOwnershipRange(v[0], &first, NULL));
+  PetscCall(Rows(n, v, &rows, &row));
   PetscCall(PetscMalloc1(n, &unit));
   for (PetscInt p = 0; p < n; p++) { /* pivoted Gram-Schmidt on the rows */
     /* The row that is largest over all ranks; ties go to the smallest number. */
-    PetscCall(Longest(comm, first, rows, n, row, &pinned[p], unit));
+    PetscCall(Longest(PetscObjectComm((PetscObject)v[0]), first, rows, n, row, &pinned[p], unit));
     /* What the pin holds is removed from the other rows. */
     for (PetscInt i = 0; i < rows; i++) {
       PetscReal dot = 0;
@@ -94,6 +89,20 @@ PetscErrorCode HycoKernelPins(MPI_Comm comm, Mat K, PetscInt n, PetscInt pinned[
   }
   PetscCall(PetscSortInt(n, pinned));
   HycoFreeAll(&row, &unit);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of the null space of K. Collective. */
+PetscErrorCode HycoKernelPins(Mat K, PetscInt n, PetscInt pinned[])
+{
+  MatNullSpace kernel;
+  const Vec *v;
+
+  PetscFunctionBegin;
+  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatGetNullSpace(K, &kernel));
+  PetscCall(MatNullSpaceGetVecs(kernel, NULL, NULL, &v));
+  PetscCall(HycoMotionPins(n, v, pinned));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

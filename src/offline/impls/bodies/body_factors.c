@@ -123,7 +123,7 @@ static PetscErrorCode TakePins(HycoReducer t, HycoBodiesFactor *factor)
   HycoCheckModel(kernel == b->p, "the number of rigid motions that contact alone prevents changes with the parameters, "
                                  "which a model of bodies does not support; train a hybrid model");
   PetscCall(PetscMalloc1(b->p + 1, &pins));
-  PetscCall(HycoKernelPins(HycoComm(t), factor->fom->K, b->p, pins));
+  PetscCall(HycoKernelPins(factor->fom->K, b->p, pins));
   if (!factor->pins) {
     factor->pins = pins;
     PetscCall(SharePins(b, factor));
