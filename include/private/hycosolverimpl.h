@@ -151,7 +151,7 @@ PetscErrorCode HycoSolverAcceptingForm(HycoSolver s, HycoSolverForm stay, HycoSo
 PetscErrorCode HycoSolverNameMethod(HycoSolver s, const char form[]);
 /* After a failure with a singular K: whether no contact forces balance the load on its null space; for too many
    contacts whether the residual of equilibrium is large. Collective. */
-PetscErrorCode HycoSolverLifts(HycoSolver s, PetscBool *lifts);
+PetscErrorCode HycoSolverLifts(HycoSolver s, Vec L, PetscBool *lifts);
 /* Sets x = 0, L = 0 and the reason, for a K that cannot be factored. */
 PetscErrorCode HycoSolverGiveUp(HycoSolver s, Vec x, Vec L);
 /* Whether the chosen Tao type requires a symmetric system. */

@@ -53,7 +53,8 @@ typedef struct {
   PetscReal *step, *trial;        /* n; 3 n: z, w and the change of w */
   PetscReal start;                /* the largest force at the start */
   HycoConeStep *linear;
-  PetscBool soft; /* the scales are those without motions on soft supports */
+  PetscBool slides; /* no forces balance the loads */
+  PetscBool soft;   /* the scales are those without motions on soft supports */
   PetscInt its;
 } Newton;
 
@@ -719,6 +720,27 @@ static PetscErrorCode Proximal(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether no forces of the cones balance the loads on floating bodies: then z has those that come nearest. */
+static PetscErrorCode SlidesAway(Newton *h, PetscReal z[])
+{
+  const PetscInt p = h->p, rows = h->n - p;
+  PetscReal *A, *f, *r;
+  PetscBool exists;
+
+  PetscFunctionBegin;
+  if (!p || h->lcp->springs) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc3(p * rows, &A, p, &f, rows, &r));
+  for (PetscInt i = 0; i < p; i++) {
+    f[i] = -h->q0[i];
+    for (PetscInt j = 0; j < rows; j++) A[j * p + i] = h->M0[(size_t)(p + j) * (size_t)h->n + (size_t)i];
+  }
+  PetscCall(HycoBlocksBalance(h->blocks, p, A, f, r, &exists));
+  h->slides = (PetscBool)!exists;
+  if (h->slides) PetscCall(PetscArraycpy(z + p, r, rows));
+  PetscCall(PetscFree3(A, f, r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* From the forces of the last step, also with the scales of bodies that hang on soft supports; then from the solution
    without friction, which may be far from them: forces that friction has locked in are not there. Scales without soft
    motions stay only with a solution. */
@@ -730,6 +752,9 @@ static PetscErrorCode FromBefore(Newton *h, PetscReal z[], HycoLCPStatus *status
   PetscFunctionBegin;
   HycoDuplicate(h->n, z, &given);
   PetscCall(FromForces(h, z, status));
+  /* Before other starts: no start would find any. */
+  if (*status != HYCO_LCP_SOLVED) PetscCall(SlidesAway(h, z));
+  if (h->slides) *status = HYCO_LCP_RAY;
   /* Floating bodies have no soft motions: they are unknowns. */
   if (*status != HYCO_LCP_SOLVED && !h->p) PetscCall(SetScales(h, &soft));
   if (soft) {
@@ -738,7 +763,7 @@ static PetscErrorCode FromBefore(Newton *h, PetscReal z[], HycoLCPStatus *status
     if (*status != HYCO_LCP_SOLVED) PetscCall(FromNormal(h, z, status));
     if (*status != HYCO_LCP_SOLVED) PetscCall(SetScales(h, NULL));
   }
-  if (*status != HYCO_LCP_SOLVED) PetscCall(FromNormal(h, z, status));
+  if (*status != HYCO_LCP_SOLVED && !h->slides) PetscCall(FromNormal(h, z, status));
   PetscCall(PetscFree(given));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -750,7 +775,7 @@ static PetscErrorCode Chain(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscCall(SetScales(h, NULL));
   if (h->lcp->blocks) {
     PetscCall(FromBefore(h, z, status));
-    if (*status == HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
+    if (*status == HYCO_LCP_SOLVED || h->slides) PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(Starts(h, z, status));
   if (*status != HYCO_LCP_SOLVED && h->lcp->blocks) {

@@ -137,10 +137,13 @@ class Random(Case):
         return True
 
     def test_hard(self):
-        """Boxes near the limit of friction, which statics places after t = 1 (N and T of the highest box): not refused before."""
+        """Boxes near the limit of friction, which statics places after t = 1 (N and T of the highest box): not refused before, and then with the motion
+        that friction does not hold."""
         for seed, limit in ((3056, 1.36), (1026, 1.82)):
             with self.subTest(seed=seed):
                 self.one(seed)
+                run = self.run_raw('solve', '-scene', self.path('scene.yaml'))
+                self.assertRegex(run.stderr, 'with this friction balance the load; no support keeps body .* from moving along')
                 with open(self.path('t.csv'), encoding='ascii', newline='') as file:
                     self.assertGreater(max(float(row['t']) for row in csv.DictReader(file)), limit)
 
