@@ -446,7 +446,6 @@ PetscErrorCode HycoPathSolve(HycoFOM f, const PetscReal mu[])
   PetscFunctionBegin;
   PetscCall(HycoPathBegin(p, mu));
   PetscCall(FindCreep(p));
-  p->slides[0] = '\0';
   if (f->friction) PetscCall(HycoFrictionBegin(f));
   PetscCall(PetscMemzero(&p->work_done, sizeof(p->work_done)));
   PetscCall(VecSet(p->F_old, 0));
