@@ -199,6 +199,8 @@ PetscReal HycoRigidAt(const HycoRigid *rigid, PetscInt dim, const PetscReal x[3]
 PetscErrorCode HycoFESetPins(HycoFE fe, PetscInt n, const PetscInt tag[], const PetscInt component[]);
 /* Finds them on the distributed mesh; motion: of the unknowns of this process's part. Collective. */
 PetscErrorCode HycoFEFreeMotions(MPI_Comm comm, HycoFE fe, HycoMotions *motions);
+/* The same without the springs, which then hold nothing. */
+PetscErrorCode HycoFEUnsupportedMotions(MPI_Comm comm, HycoFE fe, HycoMotions *motions);
 PetscErrorCode HycoMotionsDestroy(HycoMotions *motions);
 /* "body B from moving along ..." for the combination of motions with these coefficients. */
 void HycoMotionsName(HycoFE fe, const HycoMotions *motions, const PetscReal coefficient[], char name[HYCO_LINE]);

@@ -70,6 +70,7 @@ struct _p_HycoFOM {
   Vec *released;
   HycoPath path;              /* of a scene with a history, else NULL */
   HycoFriction friction;      /* of a scene with friction, else NULL */
+  HycoSoft soft;              /* with friction: rigid motions that soft springs hold, and those that nothing does */
   HycoGradientStore gradient; /* of HycoFOMGetGradient() */
   HycoSummary summary;
 };
@@ -142,6 +143,9 @@ PetscErrorCode HycoRowsCountDependent(PetscInt m, PetscInt start[], PetscInt dof
                                       PetscInt *dependent);
 /* Creates distributed vectors of the motions; VecDestroyVecs() destroys them. Collective. */
 PetscErrorCode HycoFOMMotionVectors(HycoFOM fom, const HycoMotions *motions, Vec **v);
+/* Finds the motions of `soft` at the present K, and forgets them. Collective. */
+PetscErrorCode HycoFOMFindSoft(HycoFOM fom);
+PetscErrorCode HycoFOMForgetSoft(HycoFOM fom);
 /* w[p] = B v of the contacts with a force, 0 of the others; *size: the largest square of a B v with all. Collective. */
 PetscErrorCode HycoFOMMoveClosed(HycoFOM fom, PetscInt p, const Vec v[], Vec w[], PetscReal *size);
 /* name: a rigid motion, left free by supports and springs, on which no contact force of the solution acts; "": none.

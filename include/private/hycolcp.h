@@ -88,7 +88,7 @@ void HycoConeFactorGetPieces(HycoConeFactor factor, PetscInt *n, const PetscReal
 typedef struct {
   PetscInt n, p;
   const PetscReal *M, *q;
-  PetscBool symmetric;
+  PetscBool symmetric, springs; /* springs: the block of the free unknowns is that of springs, not round-off */
   HycoSetFactor factor;
   const HycoBlocks *blocks;
   HycoConeFactor cone; /* of HYCO_TAO_CONES types; NULL: none is kept */
@@ -130,6 +130,12 @@ PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscRea
 /* The rank of a symmetric positive semidefinite matrix (k x k, overwritten), scaled to a unit diagonal, with
    tolerance 1e-12. */
 PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank);
+/*
+  Whether forces of the blocks balance a load f on p motions, A r = f with A (p x rows, by columns); if not, r are those that
+  come nearest. True where it is not decided, as for laws other than Coulomb's. Not collective.
+*/
+PetscErrorCode HycoBlocksBalance(const HycoBlocks *blocks, PetscInt p, const PetscReal A[], const PetscReal f[],
+                                 PetscReal r[], PetscBool *exists);
 /* Semismooth Newton's method for blocks of any cone, z = P(z - rho w), w = q + M z, from z = (x_pinned, forces). */
 PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *its, HycoLCPStatus *status);
 /* Writes a problem with Coulomb's law, its solution z and a start (both p + n) in FCLIB's layout `fclib_local`; dim:

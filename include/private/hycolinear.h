@@ -25,6 +25,8 @@ PetscErrorCode HycoDirectDestroy(HycoDirect *direct);
 PetscErrorCode HycoDirectPinKernel(HycoDirect direct, Mat K);
 /* The same for n given unknowns of K, ascending. */
 PetscErrorCode HycoDirectPin(HycoDirect direct, PetscInt n, const PetscInt pinned[]);
+/* Those unknowns. Borrowed. */
+const PetscInt *HycoDirectPinned(HycoDirect direct);
 /* Orders and analyses [K Bt; B 0] (B and Bt may be NULL) unless the pattern is the last one's; bytes: the estimated
    memory of the factor on all ranks together. */
 PetscErrorCode HycoDirectAnalyse(HycoDirect direct, Mat K, Mat Bt, Mat B, PetscBool symmetric, PetscReal *bytes);
@@ -32,9 +34,12 @@ PetscErrorCode HycoDirectAnalyse(HycoDirect direct, Mat K, Mat Bt, Mat B, PetscB
 PetscReal HycoDirectOperations(HycoDirect direct);
 /* Factors, after HycoDirectAnalyse() with the same matrices: S = B K^-1 Bt, m x m, column major, on every rank. */
 PetscErrorCode HycoDirectFactor(HycoDirect direct, Mat K, Mat Bt, Mat B, PetscReal S[], PetscBool *singular);
-/* g = D - B K^-1 F on every rank; D (length m) is read on rank 0. K: that of the factor, to tell work on its null space from
-   round-off as HycoKernelClean() does; NULL: it is left. */
-PetscErrorCode HycoDirectReduce(HycoDirect direct, Mat K, PetscReal least, Vec F, const PetscReal D[], PetscReal g[]);
+/* g = D - B K^-1 F on every rank; D (length m) is read on rank 0. v: the motions that are
+   pinned, whose work is told from round-off as HycoMotionClean() does; NULL: it is left. */
+PetscErrorCode HycoDirectReduce(HycoDirect direct, const Vec v[], PetscReal least, Vec F, const PetscReal D[],
+                                PetscReal g[]);
+/* The null space of K: its vectors, borrowed. */
+PetscErrorCode HycoKernelVectors(Mat K, PetscInt *n, const Vec *v[]);
 /* x = K^-1 (F - Bt L) with the F of the last HycoDirectReduce(); L (length m) is read on rank 0. */
 PetscErrorCode HycoDirectExpand(HycoDirect direct, const PetscReal L[], Vec x);
 /* The same for k right-hand sides, D = 0: g and L are m x k column major. */
@@ -48,7 +53,9 @@ PetscErrorCode HycoDirectSolve(HycoDirect direct, Vec r, Vec x);
 /* Dimension of the null space attached to K (0: none is attached). */
 PetscErrorCode HycoKernelSize(Mat K, PetscInt *n);
 /* That many unknowns, ascending, without which K is regular; the same on every rank. Collective. */
-PetscErrorCode HycoKernelPins(MPI_Comm comm, Mat K, PetscInt n, PetscInt pinned[]);
+PetscErrorCode HycoKernelPins(Mat K, PetscInt n, PetscInt pinned[]);
+/* The same for n orthonormal motions v. */
+PetscErrorCode HycoMotionPins(PetscInt n, const Vec v[], PetscInt pinned[]);
 /*
   The work of the forces F - b (b: NULL for 0) on K's null space, which no K x balances: the largest |z.(F - b)| of its
   vectors z, relative to |z|.(|F| + |b|), or to 1e-2 |z| max(|F|, |b|) if that is more; 0 without a null space. Left out
@@ -56,10 +63,13 @@ PetscErrorCode HycoKernelPins(MPI_Comm comm, Mat K, PetscInt n, PetscInt pinned[
   Collective.
 */
 PetscErrorCode HycoKernelWork(Mat K, Vec x, Vec F, Vec b, PetscReal *share);
-/* w[i], the same on every rank: the work of F on the motion in K's null space that moves the unknown pinned[i] by 1 and none of the
-   n others. It is set to 0 where it is round-off of its terms, or below `least` (of a force on the largest displacement of
-   the motion). Collective. */
-PetscErrorCode HycoKernelClean(Mat K, Vec F, PetscInt n, const PetscInt pinned[], PetscReal least, PetscReal w[]);
+/* V (n x n, by columns): the n motions v at the pinned unknowns, on every rank. Collective. */
+PetscErrorCode HycoMotionAtPins(PetscInt n, const Vec v[], const PetscInt pinned[], PetscReal V[]);
+/* w[i], the same on every rank: the work of F on the combination of the n motions v that moves the unknown pinned[i] by 1 and
+   none of the others. It is set to 0 where it is round-off of its terms, or below `least` (of a force on the largest
+   displacement of the motion). Collective. */
+PetscErrorCode HycoMotionClean(PetscInt n, const Vec v[], const PetscInt pinned[], Vec F, PetscReal least,
+                               PetscReal w[]);
 
 /* place[i] on rank 0: position of unknown i (of n) in a fill-reducing order of K. Collective. */
 PetscErrorCode HycoDissection(MPI_Comm comm, Mat K, PetscInt place[]);

@@ -99,6 +99,7 @@ struct _n_HycoPath {
   PetscInt kept;           /* number of contact systems solved with this K */
   PetscBool flows;         /* some body's law is inelastic */
   PetscBool rubs;          /* friction: the contact forces have no potential */
+  char slides[HYCO_LINE];  /* how a body slides away in a larger step, which halving cannot mend; "": none does */
   /* Anderson's acceleration: differences of iterates and residuals, newest last */
   PetscInt n_mixed;
   Vec dU[HYCO_ANDERSON], dG[HYCO_ANDERSON], U_last, G_last, G;

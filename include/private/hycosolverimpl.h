@@ -6,14 +6,24 @@
 #include <hycolinear.h>
 #include <hycosolver.h>
 
+/* Orthonormal motions, of bodies that contact alone holds or springs softer than the bodies, which the dual form of a
+   system with cones takes as unknowns of their own. stiffness: of the springs on each, 0 without; -1: to be taken from
+   K. */
+typedef struct {
+  PetscInt n;
+  Vec *v;
+  PetscReal *stiffness;
+} HycoSoft;
+
 struct _p_HycoSystem {
   PETSCHEADER(int);
   Mat K, Bt, B; /* referenced; NULL where the flexibility is given */
   Mat G;        /* referenced: the flexibility B K^-1 Bt, dense; NULL if K is given */
   Vec F, D;     /* referenced; D: if G is given, the gap without forces */
   PetscBool symmetric;
-  PetscInt n, m;      /* numbers of unknowns, and of rows: of contacts if these have one component each */
-  HycoBlocks *blocks; /* of this rank's rows; NULL: each row is a force >= 0 */
+  const HycoSoft *soft; /* borrowed; NULL or without motions: those of K's null space */
+  PetscInt n, m;        /* numbers of unknowns, and of rows: of contacts if these have one component each */
+  HycoBlocks *blocks;   /* of this rank's rows; NULL: each row is a force >= 0 */
   /* work vectors of the residuals, created by the first */
   Vec work_x[2], work_L; /* like F, like D */
   PetscReal size_B;      /* its largest row sum, valid while B is unchanged */
@@ -26,6 +36,14 @@ struct _p_HycoSystem {
 PetscErrorCode HycoSystemCheckBlocks(HycoSystem system);
 /* The round-off of an entry of the F that is set: a smaller load on a floating body is none. */
 void HycoSystemSetRounding(HycoSystem system, PetscReal rounding);
+/* Sets the motions, which stay the caller's; NULL: those of K's null space. */
+void HycoSystemSetSoft(HycoSystem system, const HycoSoft *soft);
+/* The motions whose unknowns the dual form pins: K's null space, or the soft ones. Borrowed. */
+PetscErrorCode HycoSystemMotions(HycoSystem system, PetscInt *n, const Vec *v[]);
+/* Their number. */
+PetscErrorCode HycoSystemPinned(HycoSystem system, PetscInt *n);
+/* Pins them. Collective. */
+PetscErrorCode HycoSystemPin(HycoSystem system, HycoDirect direct);
 /* Creates the work vectors of a system whose vectors are set. */
 PetscErrorCode HycoSystemWork(HycoSystem system);
 
@@ -138,7 +156,7 @@ PetscErrorCode HycoSolverAcceptingForm(HycoSolver s, HycoSolverForm stay, HycoSo
 PetscErrorCode HycoSolverNameMethod(HycoSolver s, const char form[]);
 /* After a failure with a singular K: whether no contact forces balance the load on its null space; for too many
    contacts whether the residual of equilibrium is large. Collective. */
-PetscErrorCode HycoSolverLifts(HycoSolver s, PetscBool *lifts);
+PetscErrorCode HycoSolverLifts(HycoSolver s, Vec L, PetscBool *lifts);
 /* Sets x = 0, L = 0 and the reason, for a K that cannot be factored. */
 PetscErrorCode HycoSolverGiveUp(HycoSolver s, Vec x, Vec L);
 /* Whether the chosen Tao type requires a symmetric system. */

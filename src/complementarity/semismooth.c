@@ -37,9 +37,10 @@
 #define TINY_STEP   (1. / 65536) /* where no longer one decreases |F| */
 #define MARGIN      1e-6         /* of tangential forces: nearer to the border of the cone a contact may slip */
 #define MOST_SOFT   12           /* motions on soft supports: of two bodies */
-#define SOFT        1e-2         /* of the largest flexibility: what is left without them */
-#define CLOSE       0.1          /* |F| relative to the forces: Newton's method is tried from a proximal step */
-#define MOST_ALL    200          /* iterations of all starts after which no proximal step begins */
+#define STIFFER     1e-4 /* springs of motions in units of a contact's stiffness: they move no force, and hold */
+#define SOFT        1e-2 /* of the largest flexibility: what is left without them */
+#define CLOSE       0.1  /* |F| relative to the forces: Newton's method is tried from a proximal step */
+#define MOST_ALL    200  /* iterations of all starts after which no proximal step begins */
 
 typedef struct {
   const HycoLCP *lcp;
@@ -52,7 +53,8 @@ typedef struct {
   PetscReal *step, *trial;        /* n; 3 n: z, w and the change of w */
   PetscReal start;                /* the largest force at the start */
   HycoConeStep *linear;
-  PetscBool soft; /* the scales are those without motions on soft supports */
+  PetscBool slides; /* no forces balance the loads */
+  PetscBool soft;   /* the scales are those without motions on soft supports */
   PetscInt its;
 } Newton;
 
@@ -568,6 +570,8 @@ static PetscErrorCode FromNormal(Newton *h, PetscReal z[], HycoLCPStatus *status
     forces[j] = 0;
     for (PetscInt i = 0; i < m; i++)
       M[(size_t)j * (size_t)m + (size_t)i] = h->M[(size_t)row[j] * (size_t)h->n + (size_t)row[i]];
+    /* What soft springs alone resist without friction must not run far away: it is of no use to the start. */
+    if (j < p && h->lcp->springs) M[(size_t)j * (size_t)(m + 1)] += STIFFER * h->flexibility;
   }
   /* Floating bodies start with all contacts closed (semidefinite.c); others from the contacts with a force. */
   for (PetscInt k = 0; k < b->n; k++) active[k] = (PetscBool)(p > 0 || z[row[k]] > 0);
@@ -716,6 +720,27 @@ static PetscErrorCode Proximal(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether no forces of the cones balance the loads on floating bodies: then z has those that come nearest. */
+static PetscErrorCode SlidesAway(Newton *h, PetscReal z[])
+{
+  const PetscInt p = h->p, rows = h->n - p;
+  PetscReal *A, *f, *r;
+  PetscBool exists;
+
+  PetscFunctionBegin;
+  if (!p || h->lcp->springs) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc3(p * rows, &A, p, &f, rows, &r));
+  for (PetscInt i = 0; i < p; i++) {
+    f[i] = -h->q0[i];
+    for (PetscInt j = 0; j < rows; j++) A[j * p + i] = h->M0[(size_t)(p + j) * (size_t)h->n + (size_t)i];
+  }
+  PetscCall(HycoBlocksBalance(h->blocks, p, A, f, r, &exists));
+  h->slides = (PetscBool)!exists;
+  if (h->slides) PetscCall(PetscArraycpy(z + p, r, rows));
+  PetscCall(PetscFree3(A, f, r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* From the forces of the last step, also with the scales of bodies that hang on soft supports; then from the solution
    without friction, which may be far from them: forces that friction has locked in are not there. Scales without soft
    motions stay only with a solution. */
@@ -727,6 +752,9 @@ static PetscErrorCode FromBefore(Newton *h, PetscReal z[], HycoLCPStatus *status
   PetscFunctionBegin;
   HycoDuplicate(h->n, z, &given);
   PetscCall(FromForces(h, z, status));
+  /* Before other starts: no start would find any. */
+  if (*status != HYCO_LCP_SOLVED) PetscCall(SlidesAway(h, z));
+  if (h->slides) *status = HYCO_LCP_RAY;
   /* Floating bodies have no soft motions: they are unknowns. */
   if (*status != HYCO_LCP_SOLVED && !h->p) PetscCall(SetScales(h, &soft));
   if (soft) {
@@ -735,7 +763,7 @@ static PetscErrorCode FromBefore(Newton *h, PetscReal z[], HycoLCPStatus *status
     if (*status != HYCO_LCP_SOLVED) PetscCall(FromNormal(h, z, status));
     if (*status != HYCO_LCP_SOLVED) PetscCall(SetScales(h, NULL));
   }
-  if (*status != HYCO_LCP_SOLVED) PetscCall(FromNormal(h, z, status));
+  if (*status != HYCO_LCP_SOLVED && !h->slides) PetscCall(FromNormal(h, z, status));
   PetscCall(PetscFree(given));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -747,7 +775,7 @@ static PetscErrorCode Chain(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscCall(SetScales(h, NULL));
   if (h->lcp->blocks) {
     PetscCall(FromBefore(h, z, status));
-    if (*status == HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
+    if (*status == HYCO_LCP_SOLVED || h->slides) PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(Starts(h, z, status));
   if (*status != HYCO_LCP_SOLVED && h->lcp->blocks) {
@@ -770,7 +798,7 @@ struct _n_HycoConeFactor {
 };
 
 /* Rows and columns of the free unknowns times a typical flexibility: M stays [0 A; -A^T W] in structure. Once for an M. */
-static PetscErrorCode ScaleMatrix(HycoConeFactor f, PetscInt p, PetscInt n, const PetscReal M[])
+static PetscErrorCode ScaleMatrix(HycoConeFactor f, PetscInt p, PetscInt n, const PetscReal M[], PetscBool springs)
 {
   const size_t N = (size_t)n;
   PetscReal most = 0;
@@ -782,7 +810,7 @@ static PetscErrorCode ScaleMatrix(HycoConeFactor f, PetscInt p, PetscInt n, cons
   f->flexibility = most > 0 ? most : 1;
   for (size_t i = 0; i < (size_t)p; i++) {
     /* Of rigid motions: round-off, by which a body that slides away would find a load. */
-    for (size_t j = 0; j < (size_t)p; j++) f->scaled[i * N + j] = 0;
+    for (size_t j = 0; j < (size_t)p && !springs; j++) f->scaled[i * N + j] = 0;
     for (size_t j = 0; j < N; j++) f->scaled[i * N + j] *= f->flexibility;
     for (size_t j = 0; j < N; j++) f->scaled[j * N + i] *= f->flexibility;
   }
@@ -797,7 +825,7 @@ static PetscErrorCode ScaleFree(Newton *h, HycoConeFactor f, PetscReal z[])
   h->M0 = h->lcp->M;
   h->q0 = h->lcp->q;
   if (h->p) {
-    PetscCall(ScaleMatrix(f, h->p, h->n, h->lcp->M));
+    PetscCall(ScaleMatrix(f, h->p, h->n, h->lcp->M, h->lcp->springs));
     PetscCall(PetscMalloc1(h->n, &h->scaled));
     PetscCall(PetscArraycpy(h->scaled, h->q0, h->n));
     for (PetscInt i = 0; i < h->p; i++) {

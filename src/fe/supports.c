@@ -408,7 +408,8 @@ static PetscErrorCode AddSpring(HycoFE fe, PetscInt spring, PetscInt n, const Pe
 
 /* Sums the Gram matrix of each part. A row per supported unknown: rigid motions that it resists. An oblique support
    resists n.u, thus the motion minus that of the expressed components. */
-static PetscErrorCode MeasureParts(MPI_Comm comm, HycoFE fe, const PetscInt part[], PetscInt n_parts, Part parts[])
+static PetscErrorCode MeasureParts(MPI_Comm comm, HycoFE fe, PetscBool springs, const PetscInt part[], PetscInt n_parts,
+                                   Part parts[])
 {
   SpringGram ctx;
   Sum *sum;
@@ -436,7 +437,7 @@ static PetscErrorCode MeasureParts(MPI_Comm comm, HycoFE fe, const PetscInt part
     for (PetscInt a = 0; a < n * n; a++) Add(&sum[36 * part[i] + a / n * 6 + a % n], row[a / n] * row[a % n]);
   }
   ctx = (SpringGram){part, parts, sum};
-  PetscCall(HycoSpringsVisit(fe, AddSpring, &ctx));
+  if (springs) PetscCall(HycoSpringsVisit(fe, AddSpring, &ctx));
   PetscCall(Total(comm, 36 * n_parts, sum));
   for (PetscInt k = 0; k < 36 * n_parts; k++) parts[k / 36].gram[k % 36 / 6][k % 6] = sum[k].high;
   for (PetscInt p = 0; p < n_parts && fe->formulation == HYCO_AXISYMMETRIC; p++) /* a motion along the axis is the
@@ -446,9 +447,9 @@ static PetscErrorCode MeasureParts(MPI_Comm comm, HycoFE fe, const PetscInt part
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rigid motions that supports and springs leave, orthonormal over all unknowns, part by part in the order of the
+/* Rigid motions that supports, and `springs`, leave, orthonormal over all unknowns, part by part in the order of the
    mesh file: identical on any number of ranks. Values at local unknowns; the caller destroys them. Collective. */
-PetscErrorCode HycoFEFreeMotions(MPI_Comm comm, HycoFE fe, HycoMotions *motions)
+static PetscErrorCode FindMotions(MPI_Comm comm, HycoFE fe, PetscBool springs, HycoMotions *motions)
 {
   HycoMesh m = fe->mesh;
   PetscInt *part, n_parts;
@@ -462,9 +463,23 @@ PetscErrorCode HycoFEFreeMotions(MPI_Comm comm, HycoFE fe, HycoMotions *motions)
   PetscCall(FindParts(comm, m, part, &n_parts));
   PetscCall(PetscCalloc1(n_parts, &parts));
   PetscCall(PlaceParts(comm, fe, part, n_parts, parts));
-  PetscCall(MeasureParts(comm, fe, part, n_parts, parts));
+  PetscCall(MeasureParts(comm, fe, springs, part, n_parts, parts));
   for (PetscInt p = 0; p < n_parts; p++) PetscCall(PartMotions(comm, fe, part, p, &parts[p], motions));
   PetscCall(PetscFree(parts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEFreeMotions(MPI_Comm comm, HycoFE fe, HycoMotions *motions)
+{
+  PetscFunctionBegin;
+  PetscCall(FindMotions(comm, fe, PETSC_TRUE, motions));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEUnsupportedMotions(MPI_Comm comm, HycoFE fe, HycoMotions *motions)
+{
+  PetscFunctionBegin;
+  PetscCall(FindMotions(comm, fe, PETSC_FALSE, motions));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

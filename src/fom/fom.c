@@ -13,6 +13,7 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   HycoDestroyBegin(fom, HYCO_FOM_CLASSID);
   f = *fom;
   PetscCall(HycoFrictionDestroy(f));
+  PetscCall(HycoFOMForgetSoft(f));
   PetscCall(HycoPathFree(&f->path));
   HycoDestroyAll(&f->solver, &f->system, &f->given_solver, &f->given_system, &f->given_F, &f->K, &f->B, &f->Bt, &f->U,
                  &f->Lambda, &f->F, &f->D, &f->to_local, &f->to_surface, &f->U_local, &f->U_surface);

@@ -208,6 +208,7 @@ static PetscErrorCode Assemble(HycoFOM f, HycoFriction r, Rows *rows)
   PetscCall(HycoVecWrite(r->D, r->rows, rows->gap));
   PetscCall(HycoSystemSetMatrices(r->system, f->K, r->Bt, r->B, PETSC_TRUE));
   PetscCall(HycoSystemSetVectors(r->system, f->F, r->D));
+  HycoSystemSetSoft(r->system, &f->soft);
   PetscCall(HycoSystemSetBlocks(r->system, 2, r->slip.cone, f->pairs.n, r->slip.of, r->slip.data));
   /* Whether a coefficient is above 0 on some rank. */
   rubs = HycoSlipRubs(&f->friction->slip);

@@ -7,6 +7,7 @@
 #include <hycomaterialimpl.h>
 #include <stdlib.h>
 
+#define SLIDES 1e-6 /* of the whole time: the smallest step before a body slides away */
 #define GROWTH 1.5
 #define CREEPS 1e-12 /* a smaller inelastic strain of a whole path is round-off of elastic strains */
 
@@ -121,6 +122,7 @@ PetscErrorCode HycoPathBegin(HycoPath p, const PetscReal mu[])
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(p->mu, mu, p->scene->n_parameters));
   p->t = p->scene->times[0];
+  p->slides[0] = '\0';
   p->step = p->n_steps = p->n_orders = p->n_taken = p->n_cuts = p->n_bound = 0;
   p->rate = p->crept = p->changed = 0;
   /* The first step goes as far as the listed times and the kinks allow. */
@@ -255,7 +257,7 @@ static PetscReal NextGiven(HycoPath p)
 static PetscErrorCode Reach(HycoPath p, PetscReal end, PetscBool *reached)
 {
   const HycoScene s = p->scene;
-  const PetscReal least = p->smallest * (s->times[s->n_times - 1] - s->times[0]);
+  PetscReal least = p->smallest * (s->times[s->n_times - 1] - s->times[0]);
 
   PetscFunctionBegin;
   *reached = PETSC_TRUE;
@@ -265,6 +267,8 @@ static PetscErrorCode Reach(HycoPath p, PetscReal end, PetscBool *reached)
     /* Prescribed times replace the request. */
     if (p->substeps > 1 && !p->given) p->dt = PetscMin(p->dt, (end - s->times[p->step - 1]) / (PetscReal)p->substeps);
     PetscCall(TryStep(p, stop));
+    /* Where a body slides away in a larger step, its time is known well enough: steps just before it are the dearest. */
+    if (p->slides[0]) least = PetscMax(least, SLIDES * (s->times[s->n_times - 1] - s->times[0]));
     if (p->t == t && (p->dt < least || (p->most_cuts && p->n_cuts > p->most_cuts))) *reached = PETSC_FALSE;
     /* At the listed time itself Advance() saves, after the time is recorded. */
     if (p->t > t && p->t < end && p->ops->save) PetscCall((*p->ops->save)(p));

@@ -510,5 +510,6 @@ PetscErrorCode HycoFOMSetMotions(HycoFOM f)
   PetscFunctionBegin;
   PetscCall(SetKernel(f));
   PetscCall(SetNearKernel(f));
+  PetscCall(HycoFOMFindSoft(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -90,6 +90,11 @@ PetscErrorCode HycoDirectPin(HycoDirect d, PetscInt n, const PetscInt pinned[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+const PetscInt *HycoDirectPinned(HycoDirect d)
+{
+  return d->pinned;
+}
+
 /* The unknowns of a singular K that become Schur variables. Collective. */
 PetscErrorCode HycoDirectPinKernel(HycoDirect d, Mat K)
 {
@@ -98,7 +103,7 @@ PetscErrorCode HycoDirectPinKernel(HycoDirect d, Mat K)
   PetscFunctionBegin;
   PetscCall(HycoKernelSize(K, &n));
   PetscCall(PetscMalloc1(n + 1, &pinned));
-  PetscCall(HycoKernelPins(d->comm, K, n, pinned));
+  PetscCall(HycoKernelPins(K, n, pinned));
   PetscCall(HycoDirectPin(d, n, pinned));
   PetscCall(PetscFree(pinned));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -457,7 +462,7 @@ static PetscErrorCode Run(HycoDirect d, int part)
 }
 
 /* q of the Schur variables from F and D, by forward substitution. Collective. */
-PetscErrorCode HycoDirectReduce(HycoDirect d, Mat K, PetscReal least, Vec F, const PetscReal D[], PetscReal q[])
+PetscErrorCode HycoDirectReduce(HycoDirect d, const Vec v[], PetscReal least, Vec F, const PetscReal D[], PetscReal q[])
 {
   PetscFunctionBegin;
   PetscCall(Fetch(d, F));
@@ -465,7 +470,7 @@ PetscErrorCode HycoDirectReduce(HycoDirect d, Mat K, PetscReal least, Vec F, con
   PetscCall(Run(d, 1));
   for (PetscInt k = 0; k < d->n_schur && d->rank == 0; k++) q[k] = k < d->n_pinned ? -d->reduced[k] : d->reduced[k];
   HycoBcast(q, d->n_schur, MPIU_REAL, d->comm);
-  if (K) PetscCall(HycoKernelClean(K, F, d->n_pinned, d->pinned, least, q));
+  if (v) PetscCall(HycoMotionClean(d->n_pinned, v, d->pinned, F, least, q));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

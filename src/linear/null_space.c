@@ -25,16 +25,11 @@ PetscErrorCode HycoKernelSize(Mat K, PetscInt *n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* This rank's rows of the null space, row major. */
-static PetscErrorCode Rows(Mat K, PetscInt n, PetscInt *rows, PetscReal **row)
+/* This rank's rows of the n motions, row major. */
+static PetscErrorCode Rows(PetscInt n, const Vec v[], PetscInt *rows, PetscReal **row)
 {
-  MatNullSpace kernel;
-  const Vec *v;
-
   PetscFunctionBegin;
-  PetscCall(MatGetNullSpace(K, &kernel));
-  PetscCall(MatNullSpaceGetVecs(kernel, NULL, NULL, &v));
-  PetscCall(MatGetLocalSize(K, rows, NULL));
+  PetscCall(VecGetLocalSize(v[0], rows));
   /* An unknown's entries in all motions lie together: pivots are chosen by the length of such rows. */
   PetscCall(PetscMalloc1(*rows * n, row));
   for (PetscInt k = 0; k < n; k++) {
@@ -75,20 +70,20 @@ static PetscErrorCode Longest(MPI_Comm comm, PetscInt first, PetscInt rows, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* n unknowns, ascending, such that K without them is regular: pivots of the null space's rows. Collective. */
-PetscErrorCode HycoKernelPins(MPI_Comm comm, Mat K, PetscInt n, PetscInt pinned[])
+/* n unknowns, ascending, such that K without them is regular: pivots of the motions' rows. Collective. */
+PetscErrorCode HycoMotionPins(PetscInt n, const Vec v[], PetscInt pinned[])
 {
   PetscInt rows, first;
   PetscReal *row, *unit;
 
   PetscFunctionBegin;
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(MatGetOwnershipRange(K, &first, NULL));
-  PetscCall(Rows(K, n, &rows, &row));
+  PetscCall(VecGetOwnershipRange(v[0], &first, NULL));
+  PetscCall(Rows(n, v, &rows, &row));
   PetscCall(PetscMalloc1(n, &unit));
   for (PetscInt p = 0; p < n; p++) { /* pivoted Gram-Schmidt on the rows */
     /* The row that is largest over all ranks; ties go to the smallest number. */
-    PetscCall(Longest(comm, first, rows, n, row, &pinned[p], unit));
+    PetscCall(Longest(PetscObjectComm((PetscObject)v[0]), first, rows, n, row, &pinned[p], unit));
     /* What the pin holds is removed from the other rows. */
     for (PetscInt i = 0; i < rows; i++) {
       PetscReal dot = 0;
@@ -99,6 +94,30 @@ PetscErrorCode HycoKernelPins(MPI_Comm comm, Mat K, PetscInt n, PetscInt pinned[
   }
   PetscCall(PetscSortInt(n, pinned));
   HycoFreeAll(&row, &unit);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoKernelVectors(Mat K, PetscInt *n, const Vec *v[])
+{
+  MatNullSpace kernel = NULL;
+
+  PetscFunctionBegin;
+  *n = 0;
+  *v = NULL;
+  PetscCall(MatGetNullSpace(K, &kernel));
+  if (kernel) PetscCall(MatNullSpaceGetVecs(kernel, NULL, n, v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of the null space of K. Collective. */
+PetscErrorCode HycoKernelPins(Mat K, PetscInt n, PetscInt pinned[])
+{
+  const Vec *v;
+  PetscInt all;
+
+  PetscFunctionBegin;
+  PetscCall(HycoKernelVectors(K, &all, &v));
+  PetscCall(HycoMotionPins(n, v, pinned));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -153,46 +172,35 @@ PetscErrorCode HycoKernelWork(Mat K, Vec x, Vec F, Vec b, PetscReal *share)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A[n x n], by columns: the motions at the pinned unknowns, factored. On every rank. Collective. */
-static PetscErrorCode FactorPins(MPI_Comm comm, Mat K, PetscInt n, const PetscInt pinned[], PetscReal A[],
-                                 PetscBLASInt pivot[], PetscBool *regular)
+/* V (n x n, by columns): the n motions v at the pinned unknowns, on every rank. Collective. */
+PetscErrorCode HycoMotionAtPins(PetscInt n, const Vec v[], const PetscInt pinned[], PetscReal V[])
 {
-  const Vec *z;
-  MatNullSpace kernel;
-  PetscBLASInt size, info;
   PetscInt lo, hi;
 
   PetscFunctionBegin;
-  PetscCall(PetscBLASIntCast(n, &size));
-  PetscCall(MatGetNullSpace(K, &kernel));
-  PetscCall(MatNullSpaceGetVecs(kernel, NULL, NULL, &z));
-  PetscCall(MatGetOwnershipRange(K, &lo, &hi));
-  PetscCall(PetscArrayzero(A, n * n));
+  PetscCall(VecGetOwnershipRange(v[0], &lo, &hi));
+  PetscCall(PetscArrayzero(V, n * n));
   for (PetscInt k = 0; k < n; k++) {
     const PetscScalar *a;
 
-    PetscCall(VecGetArrayRead(z[k], &a));
+    PetscCall(VecGetArrayRead(v[k], &a));
     for (PetscInt i = 0; i < n; i++) {
-      if (pinned[i] >= lo && pinned[i] < hi) A[k * n + i] = a[pinned[i] - lo];
+      if (pinned[i] >= lo && pinned[i] < hi) V[k * n + i] = a[pinned[i] - lo];
     }
-    PetscCall(VecRestoreArrayRead(z[k], &a));
+    PetscCall(VecRestoreArrayRead(v[k], &a));
   }
-  HycoAllreduce(A, n * n, MPIU_REAL, MPI_SUM, comm);
-  LAPACKgetrf_(&size, &size, A, &size, pivot, &info);
-  *regular = (PetscBool)(info == 0);
+  HycoAllreduce(V, n * n, MPIU_REAL, MPI_SUM, PetscObjectComm((PetscObject)v[0]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The elimination that finds w leaves more round-off than the sum of its terms, and a body that loads in equilibrium with
    themselves do not move would be pushed by it. Only where w is small: elsewhere it keeps its digits. */
-PetscErrorCode HycoKernelClean(Mat K, Vec F, PetscInt n, const PetscInt pinned[], PetscReal least, PetscReal w[])
+PetscErrorCode HycoMotionClean(PetscInt n, const Vec v[], const PetscInt pinned[], Vec F, PetscReal least,
+                               PetscReal w[])
 {
-  const MPI_Comm comm = PetscObjectComm((PetscObject)K);
-  PetscBool regular = PETSC_FALSE, any = PETSC_FALSE;
+  PetscBool any = PETSC_FALSE;
   PetscBLASInt size, one = 1, info, *pivot;
-  PetscReal *A, *c, all;
-  MatNullSpace kernel;
-  const Vec *z;
+  PetscReal *V, *c, all;
   Vec motion, work;
 
   PetscFunctionBegin;
@@ -201,23 +209,22 @@ PetscErrorCode HycoKernelClean(Mat K, Vec F, PetscInt n, const PetscInt pinned[]
   for (PetscInt i = 0; i < n; i++) any = (PetscBool)(any || (w[i] != 0 && PetscAbsReal(w[i]) <= SMALL * all));
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscBLASIntCast(n, &size));
-  PetscCall(MatGetNullSpace(K, &kernel));
-  PetscCall(MatNullSpaceGetVecs(kernel, NULL, NULL, &z));
-  PetscCall(PetscMalloc3(n * n, &A, n, &c, n, &pivot));
-  PetscCall(FactorPins(comm, K, n, pinned, A, pivot, &regular));
+  PetscCall(PetscMalloc3(n * n, &V, n, &c, n, &pivot));
+  PetscCall(HycoMotionAtPins(n, v, pinned, V));
+  LAPACKgetrf_(&size, &size, V, &size, pivot, &info);
   HycoVecDuplicate(F, &motion, &work);
-  for (PetscInt i = 0; i < n && regular; i++) {
+  for (PetscInt i = 0; i < n && !info; i++) {
     PetscReal sum, terms, reach;
 
     if (w[i] == 0 || PetscAbsReal(w[i]) > SMALL * all) continue;
     /* The motion that moves this pin by 1 and no other one. */
     PetscCall(PetscArrayzero(c, n));
     c[i] = 1;
-    LAPACKgetrs_("N", &size, &one, A, &size, pivot, c, &size, &info);
+    LAPACKgetrs_("N", &size, &one, V, &size, pivot, c, &size, &info);
     PetscCall(VecZeroEntries(motion));
     for (PetscInt k = 0; k < n; k++) {
       /* Those of other bodies have round-off here. */
-      if (PetscAbsReal(c[k]) > APART) PetscCall(VecAXPY(motion, c[k], z[k]));
+      if (PetscAbsReal(c[k]) > APART) PetscCall(VecAXPY(motion, c[k], v[k]));
     }
     PetscCall(VecNorm(motion, NORM_INFINITY, &reach));
     PetscCall(VecPointwiseMult(work, motion, F));
@@ -226,6 +233,6 @@ PetscErrorCode HycoKernelClean(Mat K, Vec F, PetscInt n, const PetscInt pinned[]
     if (PetscAbsReal(sum) <= PetscMax(BALANCED * terms, least * reach)) w[i] = 0;
   }
   HycoDestroyAll(&motion, &work);
-  PetscCall(PetscFree3(A, c, pivot));
+  PetscCall(PetscFree3(V, c, pivot));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

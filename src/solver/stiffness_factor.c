@@ -41,6 +41,39 @@ static PetscErrorCode FactorDense(HycoStiffness *f, Mat K, PetscBool *singular)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The block of the soft motions in S: in their coordinates the springs' stiffness, where that is known better than by
+   the Schur complement; exactly 0 for a floating body. */
+static PetscErrorCode SetSoftBlock(HycoSystem y, HycoDirect direct, PetscReal S[])
+{
+  const HycoSoft *soft = y->soft;
+  const PetscInt p = soft->n, n = p + y->m, *pinned = HycoDirectPinned(direct);
+  const PetscBLASInt size = (PetscBLASInt)p;
+  const PetscReal one = 1, zero = 0;
+  PetscReal *V, *E, *work;
+  PetscBLASInt *ipiv, info;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc4(p * p, &V, p * p, &E, p * p, &work, p, &ipiv));
+  PetscCall(HycoMotionAtPins(p, soft->v, pinned, V));
+  for (PetscInt k = 0; k < p * p; k++) E[k] = S[(size_t)(k / p) * (size_t)n + (size_t)(k % p)];
+  /* V^T C V */
+  BLASgemm_("N", "N", &size, &size, &size, &one, E, &size, V, &size, &zero, work, &size);
+  BLASgemm_("T", "N", &size, &size, &size, &one, V, &size, work, &size, &zero, E, &size);
+  for (PetscInt k = 0; k < p * p; k++) {
+    if (soft->stiffness[k / p] >= 0 || soft->stiffness[k % p] >= 0) E[k] = k / p == k % p ? soft->stiffness[k / p] : 0;
+  }
+  /* C = V^-T E V^-1, by columns: V^T X = E, then V^T C = X^T since C is symmetric. */
+  LAPACKgetrf_(&size, &size, V, &size, ipiv, &info);
+  for (int twice = 0; twice < 2 && !info; twice++) {
+    LAPACKgetrs_("T", &size, &size, V, &size, ipiv, E, &size, &info);
+    for (PetscInt k = 0; k < p * p; k++) work[k] = E[k % p * p + k / p];
+    PetscCall(PetscArraycpy(E, work, p * p));
+  }
+  for (PetscInt k = 0; k < p * p && !info; k++) S[(size_t)(k / p) * (size_t)n + (size_t)(k % p)] = E[k];
+  PetscCall(PetscFree4(V, E, work, ipiv));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* S: the Schur complement on contacts (and pinned unknowns), by columns on every rank; NULL: the factor alone. */
 static PetscErrorCode FactorSparse(HycoSolver s, Mat Bt, Mat B, PetscReal S[], PetscBool *singular)
 {
@@ -54,12 +87,13 @@ static PetscErrorCode FactorSparse(HycoSolver s, Mat Bt, Mat B, PetscReal S[], P
   HycoFreeAll(&f->lu, &f->ipiv);
   f->n = 0;
   if (!f->direct) PetscCall(HycoDirectCreate(HycoComm(s), &f->direct));
-  PetscCall(HycoDirectPinKernel(f->direct, y->K));
+  PetscCall(HycoSystemPin(y, f->direct));
   PetscCall(HycoDirectAnalyse(f->direct, y->K, Bt, B, y->symmetric, &f->bytes));
-  PetscCall(HycoKernelSize(y->K, &p));
+  PetscCall(HycoSystemPinned(y, &p));
   if (!S) PetscCall(PetscMalloc1(p * p + 1, &unused));
   PetscCall(HycoDirectFactor(f->direct, y->K, Bt, B, S ? S : unused, singular));
   PetscCall(PetscFree(unused));
+  if (S && !*singular && y->soft && y->blocks) PetscCall(SetSoftBlock(y, f->direct, S));
   PetscCall(HycoNameLinear(s, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -203,6 +203,50 @@ PetscErrorCode HycoSystemSetBlocks(HycoSystem s, PetscInt n_cones, const HycoCon
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only where there are cones: other methods need a regular K to stay regular. */
+void HycoSystemSetSoft(HycoSystem s, const HycoSoft *soft)
+{
+  s->soft = soft && soft->n ? soft : NULL;
+}
+
+PetscErrorCode HycoSystemMotions(HycoSystem s, PetscInt *n, const Vec *v[])
+{
+  PetscFunctionBegin;
+  if (!s->soft || !s->blocks) {
+    PetscCall(HycoKernelVectors(s->K, n, v));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  *n = s->soft->n;
+  *v = s->soft->v;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSystemPinned(HycoSystem s, PetscInt *n)
+{
+  PetscFunctionBegin;
+  if (s->soft && s->blocks)
+    *n = s->soft->n;
+  else
+    PetscCall(HycoKernelSize(s->K, n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSystemPin(HycoSystem s, HycoDirect direct)
+{
+  PetscInt *pinned;
+
+  PetscFunctionBegin;
+  if (!s->soft || !s->blocks) {
+    PetscCall(HycoDirectPinKernel(direct, s->K));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscMalloc1(s->soft->n, &pinned));
+  PetscCall(HycoMotionPins(s->soft->n, s->soft->v, pinned));
+  PetscCall(HycoDirectPin(direct, s->soft->n, pinned));
+  PetscCall(PetscFree(pinned));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The matrices may have been replaced since the blocks were set. */
 PetscErrorCode HycoSystemCheckBlocks(HycoSystem s)
 {

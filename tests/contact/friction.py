@@ -132,7 +132,7 @@ class Friction(Case):
         run = self.run_raw('solve', '-scene', self.changed('scene.yaml', SLOPE.replace('MU', '0.25'), ()))
         self.assertEqual(run.returncode, 1)
         self.assertIn('with this friction', run.stderr)
-        self.assertIn('body block', run.stderr)
+        self.assertIn('body block from moving along (0.96, 0.3, 0)', run.stderr)  # the slope
 
     def test_unloaded(self):
         """The block that friction holds, with its load taken away and applied again: no forces at the time without a load. So a block that a lid

@@ -193,7 +193,7 @@ static PetscErrorCode TestPinned(void)
   PetscCall(MatSetNullSpace(K, kernel));
   PetscCall(HycoKernelSize(K, &n));
   CHECK(n == 1, "one motion, found %d", (int)n);
-  PetscCall(HycoKernelPins(PETSC_COMM_WORLD, K, n, &pin));
+  PetscCall(HycoKernelPins(K, n, &pin));
   CHECK(pin == 0, "of equals the lowest, found %d", (int)pin);
   PetscCall(HycoDirectCreate(PETSC_COMM_WORLD, &direct));
   PetscCall(HycoDirectPinKernel(direct, K));

@@ -123,7 +123,7 @@ static PetscErrorCode TakePins(HycoReducer t, HycoBodiesFactor *factor)
   HycoCheckModel(kernel == b->p, "the number of rigid motions that contact alone prevents changes with the parameters, "
                                  "which a model of bodies does not support; train a hybrid model");
   PetscCall(PetscMalloc1(b->p + 1, &pins));
-  PetscCall(HycoKernelPins(HycoComm(t), factor->fom->K, b->p, pins));
+  PetscCall(HycoKernelPins(factor->fom->K, b->p, pins));
   if (!factor->pins) {
     factor->pins = pins;
     PetscCall(SharePins(b, factor));
@@ -494,8 +494,11 @@ static PetscErrorCode Respond(HycoSubstructures b, HycoBodiesFactor *factor, Pet
   const PetscInt n = b->body[k].n;
   PetscReal *u, *work;
   PetscBool *in;
+  PetscInt p;
+  const Vec *motion;
 
   PetscFunctionBegin;
+  PetscCall(HycoKernelVectors(factor->fom->K, &p, &motion));
   PetscCall(PetscCalloc2(b->ns * b->r + 1, &u, b->p * b->r + 1, &work));
   PetscCall(PetscMalloc1(b->r * factor->n + 1, &in));
   /* The basis of loads as vectors; a vector may load several bodies. */
@@ -503,8 +506,7 @@ static PetscErrorCode Respond(HycoSubstructures b, HycoBodiesFactor *factor, Pet
   PetscCall(ReduceBody(b, factor, k, b->r, factor->basis, in + k * b->r, u, work));
   /* The vectors have length 1, and round-off of it on bodies that they do not load. */
   for (PetscInt d = 0; d < b->r; d++)
-    PetscCall(HycoKernelClean(factor->fom->K, factor->basis[d], b->p, factor->pins, 16 * PETSC_MACHINE_EPSILON,
-                              work + d * b->p));
+    PetscCall(HycoMotionClean(b->p, motion, factor->pins, factor->basis[d], HYCO_NOTHING, work + d * b->p));
   /* By unknown, as predictions read them: R c is then one product by rows. */
   for (PetscInt d = 0; d < b->r && !factor->fom->rank; d++) {
     for (PetscInt i = 0; i < n; i++) record->R[i * b->r + d] = u[d * b->ns + b->start[k] + i];

@@ -292,6 +292,24 @@ PetscErrorCode HycoBodiesFrictionProbe(HycoBodiesFriction f, HycoBodiesWork o, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoBodiesFrictionSlides(HycoBodiesFriction f, PetscBool *slides)
+{
+  const PetscInt n = f->all.n, p = f->p;
+  PetscReal *A, *load, *r;
+  PetscBool exists;
+
+  PetscFunctionBegin;
+  *slides = PETSC_FALSE;
+  if (!p) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc3(p * n, &A, p, &load, n, &r));
+  for (PetscInt i = 0; i < p; i++) load[i] = -f->q[i];
+  for (PetscInt k = 0; k < p * n; k++) A[k] = f->M[(size_t)(p + k / p) * (size_t)(p + n) + (size_t)(k % p)];
+  PetscCall(HycoBlocksBalance(f->blocks, p, A, load, r, &exists));
+  *slides = (PetscBool)!exists;
+  PetscCall(PetscFree3(A, load, r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The forces by row. Borrowed. */
 const PetscReal *HycoBodiesFrictionForces(HycoBodiesFriction f)
 {

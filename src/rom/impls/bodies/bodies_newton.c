@@ -829,13 +829,15 @@ static PetscBool Agrees(HycoROM m, const PetscReal alpha[])
 static PetscErrorCode Touch(HycoROM m, PetscReal t1, const PetscReal alpha[], PetscBool again, HycoStepAttempt *a)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  PetscBool solved;
+  PetscBool solved, slides = PETSC_FALSE;
   PetscInt its;
 
   PetscFunctionBegin;
   PetscCall(HycoBodiesFrictionTouch(w->friction, &w->bodies, t1, w->n_rows ? alpha : NULL, again, &its, &solved));
   a->active_its += its;
   if (!solved) HycoFormat(a->why, "not converged: no contact forces with this friction balance the load");
+  if (!solved) PetscCall(HycoBodiesFrictionSlides(w->friction, &slides));
+  if (slides) HycoFormat(w->path->slides, "%s; a body that contact alone holds slides away", a->why);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -59,6 +59,7 @@ static PetscErrorCode Settle(HycoROM m, PetscReal t0, PetscReal t1, const PetscR
   /* Recomputed from U and Lambda: the search's own word is not enough. */
   a->converged = (PetscBool)(HycoKKTMax(&p->kkt) <= 1e-8);
   if (!a->converged) HycoFormat(a->why, "the residual of the contacts is %.1e", (double)HycoKKTMax(&p->kkt));
+  if (!a->converged && p->slides[0]) HycoFormat(a->why, "%s", p->slides);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -30,7 +30,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   (void)asked;
   *cost = -1;
   if (!y->K || !y->m || s->iterative) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoKernelSize(y->K, &p));
+  PetscCall(HycoSystemPinned(y, &p));
   if (p && strcmp(s->now.type, HYCO_TAO_ACTIVE_SET) && !(y->blocks && s->now.traits & HYCO_TAO_CONES)) {
     HycoFormat(why, "a body is held by contact only, which %s cannot solve; use -hyco_solver_type active_set",
                s->now.word);
@@ -53,7 +53,7 @@ static PetscErrorCode EstimateFactor(HycoSolver s, HycoSolverForm form, PetscRea
   PetscFunctionBegin;
   (void)form;
   if (!f->direct) PetscCall(HycoDirectCreate(HycoComm(s), &f->direct));
-  PetscCall(HycoDirectPinKernel(f->direct, y->K));
+  PetscCall(HycoSystemPin(y, f->direct));
   PetscCall(HycoDirectAnalyse(f->direct, y->K, y->Bt, y->B, y->symmetric, bytes));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -84,7 +84,7 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
   PetscInt p;
 
   PetscFunctionBegin;
-  PetscCall(HycoKernelSize(y->K, &p));
+  PetscCall(HycoSystemPinned(y, &p));
   if (!d->S || d->m != y->m || d->p != p) {
     PetscCall(Resize(d, y->m, p));
     /* S has to be computed into the new array, thus K factored again, even if it is unchanged. */
@@ -100,13 +100,16 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
 static PetscErrorCode FreeGap(HycoSolver s, const Dual *d, Vec x)
 {
   HycoSystem y = s->system;
+  PetscInt p;
+  const Vec *motion;
 
   PetscFunctionBegin;
   /* MUMPS reduces F and D to the Schur variables in one forward substitution; with s->free the displacements without
      forces are known. */
   if (!s->stiffness.lu && !s->free) {
     PetscCall(HycoVecGather(y->D, d->L));
-    PetscCall(HycoDirectReduce(s->stiffness.direct, y->K, y->rounding, y->F, d->L, d->g));
+    PetscCall(HycoSystemMotions(y, &p, &motion));
+    PetscCall(HycoDirectReduce(s->stiffness.direct, motion, y->rounding, y->F, d->L, d->g));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (s->free)
@@ -154,6 +157,7 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *s
                  .q = d->g,
                  .symmetric = s->system->symmetric,
                  .warm = s->warm,
+                 .springs = (PetscBool)(s->system->soft != NULL),
                  .given = (PetscBool)(s->system->blocks != NULL),
                  .sign = s->system->blocks ? &s->sign : NULL,
                  .monitor = s->monitor,
