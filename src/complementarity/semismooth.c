@@ -29,9 +29,9 @@
 #define LOCKED      1e-6  /* share of the forces before: below it friction has locked nothing in */
 #define SHIFT       1e-3  /* alpha relative to M's diagonal: the proximal point method's rate of convergence */
 #define TIGHT       1e-14 /* |F| relative to the forces: nothing is left to gain */
-#define SOLVED      1e-10 /* the same: solved, if the steps gain nothing more */
-#define NEAR        1e-6  /* the same: near a solution, */
-#define ROUNDING    1e-12 /* and round-off, if a step does not halve it */
+#define ENOUGH      1e-12 /* the same: no step is tried */
+#define SOLVED      1e-10 /* the same: solved, and round-off if a step does not halve it */
+#define NEAR        1e-6  /* the same: near a solution */
 #define CONTRACTS   0.2   /* of |F| in a step: more, and a factor of another J is made again */
 #define LEAST_STEP  (1. / 64)
 #define TINY_STEP   (1. / 65536) /* where no longer one decreases |F| */
@@ -206,8 +206,8 @@ static PetscErrorCode Search(Newton *h, PetscReal shortest, PetscReal z[], Petsc
                              PetscBool *less)
 {
   /* Near round-off only the full step is tried, and half is enough. */
-  const PetscReal before = *norm, least = before <= ROUNDING * *size ? 1 : shortest;
-  const PetscReal share = before <= ROUNDING * *size ? 0.5 : 1e-4;
+  const PetscReal before = *norm, least = before <= SOLVED * *size ? 1 : shortest;
+  const PetscReal share = before <= SOLVED * *size ? 0.5 : 1e-4;
   const PetscBool near = (PetscBool)(before <= NEAR * *size);
   PetscReal *trial = h->trial, *w = h->trial + h->n, *change = h->trial + 2 * h->n;
 
@@ -288,7 +288,7 @@ static PetscErrorCode Improve(Newton *h, PetscReal z[], PetscReal *norm, PetscRe
   if (*regular) PetscCall(Search(h, LEAST_STEP, z, norm, size, less));
   /* A new factor where the present one does not contract; the next step begins with it. */
   if (*less && lagged && *norm > CONTRACTS * before) PetscCall(HycoConeStepRenew(h->linear));
-  if (!*less && *norm > ROUNDING * *size) { /* by the residual, with a factor of J itself */
+  if (!*less && *norm > SOLVED * *size) { /* by the residual, with a factor of J itself */
     PetscCall(HycoConeStepRenew(h->linear));
     PetscCall(Step(h, z, PETSC_TRUE, PETSC_FALSE, regular));
     /* Not where forces are not unique: proximal steps find those near the last ones. */
@@ -296,7 +296,7 @@ static PetscErrorCode Improve(Newton *h, PetscReal z[], PetscReal *norm, PetscRe
       PetscCall(Search(h, h->linear->nearly_singular && !h->soft ? LEAST_STEP : TINY_STEP, z, norm, size, less));
   }
   /* Nothing to gain from least squares: the step was good, J is regular, or |F| is round-off already. */
-  if (*less || !h->linear->nearly_singular || *norm <= ROUNDING * *size) PetscFunctionReturn(PETSC_SUCCESS);
+  if (*less || !h->linear->nearly_singular || *norm <= SOLVED * *size) PetscFunctionReturn(PETSC_SUCCESS);
   if (!h->linear->m || h->linear->m > MOST_LEAST) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Step(h, z, PETSC_TRUE, PETSC_TRUE, regular));
   if (*regular) PetscCall(Search(h, LEAST_STEP, z, norm, size, less));
@@ -312,7 +312,7 @@ static PetscErrorCode Iterate(Newton *h, PetscReal z[], HycoLCPStatus *status)
 
   PetscFunctionBegin;
   PetscCall(Residual(h, z, &norm, &size));
-  for (PetscInt k = 0; k < most && norm > TIGHT * size && regular && less; k++) {
+  for (PetscInt k = 0; k < most && norm > ENOUGH * size && regular && less; k++) {
     PetscInt changes;
 
     PetscCall(HycoConeStepDerive(h->linear, h->blocks, h->y, &changes));

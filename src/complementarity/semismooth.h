@@ -50,7 +50,7 @@ typedef struct {
   PetscBool updated; /* S is that of the present DP */
 } HycoConeStep;
 
-#define HYCO_CONE_CHANGES 64 /* most rows by which J differs from its base */
+#define HYCO_CONE_CHANGES 128 /* most rows by which J differs from its base */
 
 /* n_blocks, p + rows of the blocks; nothing is derived yet. */
 PetscErrorCode HycoConeStepCreate(PetscInt p, const HycoBlocks *blocks, const PetscReal rho[], HycoConeStep *step);

@@ -2,10 +2,9 @@
 #include "semismooth.h"
 #include <petscblaslapack.h>
 
-#define RANK_TOL 1e-10 /* singular values of A relative to the largest that count as 0 */
-#define SINGULAR 1e-8  /* least pivot of A relative to the largest: below, least squares may give another step */
-#define LEAST_SHARE                                                                                                    \
-  3 /* the base changes once a third of its unknowns would be updated: a solve with each costs a factor then */
+#define RANK_TOL    1e-10 /* singular values of A relative to the largest that count as 0 */
+#define SINGULAR    1e-8  /* least pivot of A relative to the largest: below, least squares may give another step */
+#define LEAST_SHARE 2 /* the base changes once half of its unknowns would be updated: their solves cost a factor then */
 #define NEAR        0.3   /* largest change of an entry of DP at which the base may stand for it */
 #define HOMOGENEOUS 1e-14 /* P(y) - DP y relative to y: round-off */
 #define ROUNDING    1e-13 /* rows of DP relative to the longest that count as 0 */
@@ -293,7 +292,7 @@ PetscErrorCode HycoConeStepStick(HycoConeStep *t)
 
 /* -- A and its factor -- */
 
-/* Column by column; each entry has at most size^2 products, as rows of L^T and columns of E are those of one block. */
+/* Column by column, M E first; rows of L^T and columns of E are those of one block. */
 static void Assemble(HycoConeStep *t)
 {
   const PetscInt m = t->m;
@@ -302,18 +301,19 @@ static void Assemble(HycoConeStep *t)
 
   for (PetscInt c = 0; c < m; c++) {
     const HycoConeTerms *right = &t->right[c];
-    PetscReal *column = t->A + (size_t)c * (size_t)m;
+    PetscReal *column = t->A + (size_t)c * (size_t)m, *ME = t->product;
 
     for (PetscInt j = 0; j < right->n; j++) {
       const PetscReal *M = t->M + (size_t)right->row[j] * (size_t)t->n, factor = right->value[j];
 
-      for (PetscInt r = 0; r < m; r++) {
-        const HycoConeTerms *left = &t->left[r];
-        PetscReal sum = left->value[0] * M[left->row[0]];
+      for (PetscInt i = 0; i < t->n; i++) ME[i] = j ? ME[i] + factor * M[i] : factor * M[i];
+    }
+    for (PetscInt r = 0; r < m; r++) {
+      const HycoConeTerms *left = &t->left[r];
+      PetscReal sum = left->value[0] * ME[left->row[0]];
 
-        for (PetscInt i = 1; i < left->n; i++) sum += left->value[i] * M[left->row[i]];
-        column[r] = j ? column[r] + factor * sum : factor * sum;
-      }
+      for (PetscInt i = 1; i < left->n; i++) sum += left->value[i] * ME[left->row[i]];
+      column[r] = sum;
     }
   }
   for (PetscInt k = 0; k < t->blocks->n; a += t->base_rank[k++]) { /* 1 - L^T E of each block */
@@ -441,26 +441,41 @@ static PetscErrorCode AddColumns(HycoConeStep *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* (M v)_row */
-static PetscReal RowTimes(const HycoConeStep *t, PetscInt row, const PetscReal v[])
+/* -rho (M Z)_row for `count` columns of Z. */
+static void RowTimes(const HycoConeStep *t, PetscInt row, PetscInt count, const PetscReal Z[], PetscReal y[])
 {
-  const PetscBLASInt n = (PetscBLASInt)t->n, one = 1;
-  const PetscInt stride = t->symmetric ? 1 : t->n;
-  const PetscBLASInt step = (PetscBLASInt)stride;
+  const PetscBLASInt n = (PetscBLASInt)t->n, columns = (PetscBLASInt)count, one = 1, step = t->symmetric ? 1 : n;
+  const PetscReal factor = -t->rho[row], add = 1;
 
-  return BLASdot_(&n, t->M + (size_t)row * (t->symmetric ? (size_t)t->n : 1), &step, v, &one);
+  for (PetscInt c = 0; c < count; c++) y[c] = 0;
+  BLASgemv_("T", &n, &columns, &factor, Z, &n, t->M + (size_t)row * (t->symmetric ? (size_t)n : 1), &step, &add, y,
+            &one);
 }
 
-/* ((I - rho M) Z)_row for all columns. Only columns that are new since the last call. */
-static const PetscReal *RowOfQ(HycoConeStep *t, PetscInt row)
+/* Whether row i of block k has DP = 1 in the base, as a closed contact's normal force, or a tangential one that sticks:
+   (I - rho M) s is then s - b there, by the equation of s itself. */
+static PetscBool IsFree(const HycoConeStep *t, PetscInt k, PetscInt i)
 {
+  const PetscInt size = t->blocks->row[k + 1] - t->blocks->row[k];
+  const PetscReal *row = t->base + (size_t)k * HYCO_BLOCK + (size_t)(i * size);
+  PetscBool is = PETSC_TRUE;
+
+  for (PetscInt j = 0; j < size; j++) is = (PetscBool)(is && row[j] == (i == j));
+  return is;
+}
+
+/* ((I - rho M) Z) in row i of block k for all columns. Only columns that are new since the last call. */
+static const PetscReal *RowOfQ(HycoConeStep *t, PetscInt k, PetscInt i)
+{
+  const PetscInt row = t->p + t->blocks->row[k] + i;
+  const PetscBool is = IsFree(t, k, i);
+  const PetscInt known = t->known[row], count = t->n_columns - known;
+  const PetscReal *Z = t->Z + (size_t)known * (size_t)t->n;
   PetscReal *Q = t->Q + (size_t)row * HYCO_CONE_CHANGES;
 
-  for (PetscInt c = t->known[row]; c < t->n_columns; c++) {
-    const PetscReal *z = t->Z + (size_t)c * (size_t)t->n;
-
-    Q[c] = z[row] - t->rho[row] * RowTimes(t, row, z);
-  }
+  if (count && !is) RowTimes(t, row, count, Z, Q + known);
+  for (PetscInt c = known; c < t->n_columns; c++)
+    Q[c] = t->Z[(size_t)c * (size_t)t->n + (size_t)row] + (is ? -(PetscReal)(t->column[row] == c) : Q[c]);
   t->known[row] = t->n_columns;
   return Q;
 }
@@ -495,7 +510,7 @@ static PetscErrorCode Update(HycoConeStep *t, PetscBool *regular)
 
     for (PetscInt k = 0; k < c; k++) t->S[k * c + r] = r == k;
     for (PetscInt j = 0; j < size; j++) {
-      const PetscReal *Q = change[j] != 0 ? RowOfQ(t, first + j) : NULL;
+      const PetscReal *Q = change[j] != 0 ? RowOfQ(t, t->block[r], j) : NULL;
 
       for (PetscInt k = 0; Q && k < c; k++) t->S[k * c + r] -= change[j] * Q[t->column[t->changed[k]]];
     }
@@ -508,6 +523,18 @@ static PetscErrorCode Update(HycoConeStep *t, PetscBool *regular)
   /* A small pivot: the update loses digits, and a new base is taken. */
   *regular = t->updated = (PetscBool)(info == 0 && least >= SINGULAR * PetscMax(most, 1));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* (I - rho M) s - rho q in row i of block k, for the step of the base, or its point (q). */
+static PetscReal Argument(const HycoConeStep *t, PetscInt k, PetscInt i, const PetscReal q[], const PetscReal b[],
+                          const PetscReal s[])
+{
+  const PetscInt row = t->p + t->blocks->row[k] + i;
+  PetscReal product;
+
+  if (IsFree(t, k, i)) return s[row] - (b ? b[row] : 0);
+  RowTimes(t, row, 1, s, &product);
+  return s[row] + product - (q ? t->rho[row] * q[row] : 0);
 }
 
 /* s -= Z (I + R Z)^-1 R s; with q (b NULL) the right-hand side has changed with DP, too: s is a point, not a step. Rows in
@@ -526,9 +553,7 @@ static PetscErrorCode Correct(HycoConeStep *t, const PetscReal q[], const PetscR
     t->small[r] = 0;
     for (PetscInt j = 0; j < size; j++) {
       /* The right-hand side with the new rows of DP, applied to the step of the base. */
-      if (change[j] != 0)
-        t->small[r] -=
-            change[j] * (s[first + j] - t->rho[first + j] * (RowTimes(t, first + j, s) + (q ? q[first + j] : 0)));
+      if (change[j] != 0) t->small[r] -= change[j] * Argument(t, t->block[r], j, q, b, s);
     }
   }
   if (c) LAPACKgetrs_("N", &c, &one, t->S, &c, t->small_pivot, t->small, &c, &info);

@@ -252,6 +252,7 @@ static PetscErrorCode Sample(HycoReducer t, HycoSnapshots store, HycoFOM f, Pets
   const PetscInt nodes = PetscMin(SPREAD, HycoBodiesGrid(b, 0, NULL));
   /* Of samples, so that U, nodes x samples on all ranks, has no more than MOST_NUMBERS entries. */
   const PetscReal most = MOST_NUMBERS / ((PetscReal)t->sizes[0] * t->sizes[3] * nodes);
+  const PetscBool friction = HycoSceneHasFriction(t->scene);
   HycoSamples points;
   PetscInt n = PetscMax(LEAST, PetscMin(wanted, (PetscInt)PetscMin(most, 1e6)));
   PetscErrorCode ierr;
@@ -260,9 +261,10 @@ static PetscErrorCode Sample(HycoReducer t, HycoSnapshots store, HycoFOM f, Pets
   *all = (PetscBool)(n >= wanted && t->scene->n_parameters);
   PetscCall(HycoSamplesCreate(t->scene, &points));
   PetscCall(HycoSamplesAddPoint(points, b->first));
-  if (t->scene->n_parameters) PetscCall(HycoSamplesAddScattered(points, n + CHECKS));
+  /* A path with friction gives several samples, and no checks. */
+  if (t->scene->n_parameters) PetscCall(HycoSamplesAddScattered(points, friction ? n / SEEN : n + CHECKS));
   PetscCall(HycoSamplesGet(points, &n, NULL, NULL));
-  if (HycoSceneHasFriction(t->scene)) n *= SEEN;
+  if (friction) n *= SEEN;
   if (t->scene->n_times) n += 1 + t->n_s / PathStride(t);
   PetscCall(PetscRealloc(((size_t)n * (size_t)b->r + 1) * sizeof(PetscReal), &sampled->c));
   PetscCall(PetscRealloc(((size_t)n * (size_t)b->ns + 1) * sizeof(PetscReal), &sampled->f));
