@@ -334,6 +334,7 @@ PetscErrorCode HycoBodiesFrictionDisproven(HycoBodiesFriction friction, PetscBoo
    kappa. HycoBodiesRows(): those of the fields of body k, of which n are turns times modes, then the unknowns inside;
    HycoBodiesAddRows(): row += a x - H f. */
 PetscErrorCode HycoBodiesBring(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal mu[]);
+PetscReal HycoBodiesStretch(HycoBodiesWork work);
 PetscErrorCode HycoBodiesBlend(PetscInt n_samples, const PetscReal weight[], PetscInt n, const PetscReal data[],
                                PetscReal sum[]);
 PetscErrorCode HycoBodiesYield(HycoBodiesWork work, const PetscReal f[], PetscReal u[]);

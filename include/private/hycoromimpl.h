@@ -167,7 +167,8 @@ struct _p_HycoROM {
                                called */
   PetscBool whole_current;  /* U_whole is current */
   PetscBool balanced;       /* balance belongs to it */
-  PetscReal remainder;      /* of (41): the relative difference of the forces in the RID; of a path the largest */
+  PetscReal stretch;   /* growth of the errors of what is interpolated, 1 or less inside; the ops `features` sets it */
+  PetscReal remainder; /* of (41): the relative difference of the forces in the RID; of a path the largest */
   PetscReal *gamma, *U, *Lambda, *stress, *U_whole;
   PetscInt n_modal, *modal; /* the unknowns of fe that are not full-order ones; NULL: not needed yet */
   HycoTrace trace;          /* of a scene with a history */

@@ -9,7 +9,7 @@
     4  tail         the last quarter of the modes' coefficients relative to all: indicates the error of truncation
 
   Outside the region of training the estimate is multiplied by (1 + b / d)^2, b the scaled distance from it and d the
-  spacing of the training points. K's rows on the interface lack the cells outside the RID, so that no residual can be
+  spacing of the training points, or by the Lebesgue function of what is interpolated there if that is more. K's rows on the interface lack the cells outside the RID, so that no residual can be
   computed there; the misfit measures the disagreement between the two sides of the interface instead.
 
   Held-out points do not have every regime that a prediction may meet. Where a feature is larger than at all held-out
@@ -375,6 +375,7 @@ PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
   PetscCall(FindReach(m));
   /* Reported whether or not there are estimates. */
   p->beyond = Beyond(m, m->fe->mu, nearest);
+  m->stretch = 1;
   if (p->reason > 0) PetscTryTypeMethod(m, estimate, p);
   /* Features of forces outside the RID need the reconstruction. */
   if (p->reason <= 0 || (m->ops->reconstruct && !m->reconstruct)) PetscFunctionReturn(PETSC_SUCCESS);
@@ -386,7 +387,8 @@ PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
 
     /* Beyond the training the estimates grow with the square of the distance in units of a usual distance between points. */
     outside = 1 + (p->beyond > 0 ? HycoEstimatesDistance(m->model->scene, m->fe->mu, nearest) / t->floor[DISTANCE] : 0);
-    EvaluateFormulas(m, feature, outside * outside * factor, p);
+    outside = p->beyond > 0 ? PetscMax(outside * outside, m->stretch) : 1;
+    EvaluateFormulas(m, feature, outside * factor, p);
     for (PetscInt q = 0; torn && q < t->n_outputs; q++) {
       if (HycoQuantityOfStress(&m->model->scene->quantity[q])) p->estimated_error_quantity[q] = -1;
     }

@@ -159,6 +159,7 @@ static PetscErrorCode Features(HycoROM m, PetscReal misfit[2])
   PetscFunctionBegin;
   misfit[0] = m->prediction.interpolation_error;
   misfit[1] = 0;
+  m->stretch = HycoBodiesStretch((HycoBodiesWork)m->work);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -545,6 +545,7 @@ static PetscErrorCode Features(HycoROM m, PetscReal misfit[2])
   PetscFunctionBegin;
   misfit[0] = w->bodies.bodies->bound;
   misfit[1] = w->misfit;
+  m->stretch = HycoBodiesStretch(&w->bodies);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

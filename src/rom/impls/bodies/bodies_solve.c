@@ -108,6 +108,21 @@ PetscErrorCode HycoBodiesWeights(HycoSubstructures b, PetscInt k, const PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The Lebesgue function of the interpolation at the present weights: outside the nodes it grows as the error of a polynomial
+   may. */
+PetscReal HycoBodiesStretch(HycoBodiesWork o)
+{
+  PetscReal most = 0;
+
+  for (PetscInt k = 0; k < o->bodies->n; k++) {
+    PetscReal sum = 0;
+
+    for (PetscInt s = 0; s < o->bodies->body[k].n_samples; s++) sum += PetscAbsReal(o->weight[k][s]);
+    most = PetscMax(most, sum);
+  }
+  return most;
+}
+
 /* sum = the sum of the n_samples of n numbers each, times their weights. */
 PetscErrorCode HycoBodiesBlend(PetscInt n_samples, const PetscReal weight[], PetscInt n, const PetscReal data[],
                                PetscReal sum[])
