@@ -57,16 +57,21 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   HycoPrediction p;
   HycoErrors e = {0};
   char words[DRIVER_LINE];
+  PetscReal begin = HycoNow(), seconds[2];
 
   PetscFunctionBegin;
+  /* Each with its outputs, and the model's with its estimates, as a user asks for them. */
   PetscCall(HycoFOMSolve(fom, n_par, mu));
   PetscCall(HycoFOMGetSummary(fom, &s));
+  seconds[0] = HycoNow() - begin;
   if (s.reason < 0) {
     PetscCall(DriverFormatPoint(scene, mu, words, NULL));
     HycoFail("the full-order solution at %s failed: %s; no comparison is possible", words, s.why);
   }
+  begin = HycoNow();
   PetscCall(HycoROMPredict(model, n_par, mu));
   PetscCall(HycoROMGetPrediction(model, &p));
+  seconds[1] = HycoNow() - begin;
   PetscCall(HycoROMCompare(model, fom, &e));
   v[DRIVER_U] = e.u;
   v[DRIVER_U_H1] = e.u_h1;
@@ -78,6 +83,8 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   v[DRIVER_LAMBDA] = e.lambda;
   v[DRIVER_LAMBDA_DUAL] = e.lambda_dual;
   FillCommon(c, &s, &p, v, sliding);
+  v[c->n_errors + DRIVER_SECONDS_FOM] = seconds[0];
+  v[c->n_errors + DRIVER_SECONDS_ROM] = seconds[1];
   /* The fallback solver of the contact problem, not full order. */
   v[c->n_errors + DRIVER_FALLBACK] = p.reason == HYCO_CONVERGED_FALLBACK;
   v[c->n_errors + DRIVER_COVERED] = p.covered_force;
