@@ -399,7 +399,8 @@ class Prediction:
     """The answers of a model at one point or at many; values have the shape of the points, `shape`: () for one point.
 
     mu              (*shape, parameters)
-    outputs         {name: value} of the scene's outputs
+    outputs         {name: value} of the scene's outputs; of a path at its last listed time
+    path            {name: value} over the listed times of a path: the largest, or as the output's entry `path` says; else {}
     estimates       {name: estimated absolute error of that output}; NaN: the model has none
     error_u, error_stress, error_forces   estimated relative errors of the fields; NaN: none
     unseen          how far beyond the held-out points' regime (above 3 the estimates are not tested)
@@ -409,7 +410,8 @@ class Prediction:
     data            all members of HycoPrediction (hycorom.h), a structured array; prediction['lambda_max'] is an output or a member
     """
 
-    def __init__(self, mu, data, outputs, parameters, contact_forces=None, displacement=None):
+    def __init__(self, mu, data, outputs, parameters, contact_forces=None, displacement=None, paths=False):
+        self._paths = paths
         self.mu, self.data, self.shape = mu, data, data.shape
         self.contact_forces, self.displacement = contact_forces, displacement
         self._outputs, self._parameters = outputs, parameters
@@ -427,6 +429,10 @@ class Prediction:
     @cached_property
     def outputs(self):
         return {name: self._value('quantity', k) for k, name in enumerate(self._outputs)}
+
+    @cached_property
+    def path(self):
+        return {name: self._value('path_quantity', k) for k, name in enumerate(self._outputs) if self._paths}
 
     @cached_property
     def estimates(self):
@@ -452,10 +458,11 @@ class Prediction:
         return self.outputs[name] if name in self.outputs else self.data[name][()]
 
     def table(self):
-        """{column: values}, a row per point: parameters, outputs, their estimates as NAME_estimate, total_contact_force, converged.
+        """{column: values}, a row per point: parameters, outputs, over a path as path_NAME, estimates as NAME_estimate, total_contact_force, converged.
         pandas.DataFrame(prediction.table()) is a table of it."""
         columns = {name: self.mu[..., k] for k, name in enumerate(self._parameters)}
         columns.update(self.outputs)
+        columns.update({f'path_{name}': value for name, value in self.path.items()})
         columns.update({f'{name}_estimate': value for name, value in self.estimates.items()})
         columns.update(total_contact_force=self.data['total_contact_force'], converged=self.converged)
         return {name: np.ravel(value) for name, value in columns.items()}
@@ -514,7 +521,7 @@ class Model(_Handle):
         if not shape:  # the one that contacts(), history(), write() are about
             c.call('HycoROMPredict', handle, c.count(n_par), c.address(mu))
             c.call('HycoROMGetPrediction', handle, c.address(data))
-        result = Prediction(mu, data, self.outputs, self.parameters, forces, u)
+        result = Prediction(mu, data, self.outputs, self.parameters, forces, u, self._times > 0)
         if check and not (np.all(result.converged) if shape else result.converged):
             bad = np.flatnonzero(~np.atleast_1d(result.converged).ravel())
             at = mu.reshape(-1, n_par)[bad[0]]

@@ -227,7 +227,8 @@ class Python(Case):
             g = model.gradient([[0.7], [0.9]])
             self.assertEqual((g.value.shape, g.times.shape, g.path.shape), ((2, 2, 1), (2, 3, 2, 1), (2, 2, 1)))
             self.assertLess(h['work'][-1], -1e-3)  # the output, not HycoStep's member; the largest size over the path, not the largest value
-            np.testing.assert_allclose(p.data['path_quantity'][:2], [h['long'][-1], h['work'][-1]], rtol=1e-9)
+            np.testing.assert_allclose([p.path['long'], p.path['work']], [h['long'][-1], h['work'][-1]], rtol=1e-9)
+            self.assertEqual(model.predict([[0.7], [0.9]]).table()['path_work'][1], p.path['work'])
             np.testing.assert_array_equal(g.times[:, -1], g.value)
             np.testing.assert_allclose(g.path, g.value, rtol=1e-9)  # it is longest at the end
             report = self.hyco('predict', '-model', 'bar.h5', '-mu', '0.9', '-gradient')
