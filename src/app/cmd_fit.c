@@ -187,7 +187,7 @@ static PetscReal Mean(const Fit *f, const PetscReal value[])
    the last time first, then those over the path, hence the remainder. */
 static PetscErrorCode PrintAnswer(const Fit *f, const PetscReal full[], cJSON *json)
 {
-  const char *names[HYCO_MAX_QUANTITIES];
+  const char *names[HYCO_MAX_QUANTITIES], *units[HYCO_MAX_QUANTITIES];
   char words[DRIVER_LINE];
   const PetscReal *value = f->value;
   PetscInt n;
@@ -197,6 +197,7 @@ static PetscErrorCode PrintAnswer(const Fit *f, const PetscReal full[], cJSON *j
   PetscCall(DriverFormatPoint(f->scene, f->mu, words, NULL));
   PetscCall(DriverPrint("found: %s\n", words));
   PetscCall(HycoSceneGetQuantities(f->scene, &n, names));
+  PetscCall(HycoSceneGetQuantityUnits(f->scene, &n, units));
   for (PetscInt k = 0; k < f->n; k++) {
     char name[DRIVER_LINE];
     cJSON *of;
@@ -207,7 +208,7 @@ static PetscErrorCode PrintAnswer(const Fit *f, const PetscReal full[], cJSON *j
     PetscCall(DriverPrint("%s: target %.6g, model %.6g", name, (double)f->target[k], (double)value[k]));
     if (full) cJSON_AddNumberToObject(of, "full_order", full[k]);
     if (full) PetscCall(DriverPrint(", full order %.6g", (double)full[k]));
-    PetscCall(DriverPrint("\n"));
+    PetscCall(DriverPrint("%s%s\n", units[f->output[k] % n][0] ? " " : "", units[f->output[k] % n]));
   }
   /* By the scales of the fit, so that outputs of different units weigh the same. */
   cJSON_AddNumberToObject(json, "misfit_model", Mean(f, value));

@@ -382,14 +382,27 @@ static PetscErrorCode SetRanges(Fit *f, const PetscReal held[], PetscInt *n_free
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How many parameters the targets determine near the answer: the rank of J, whose columns of held parameters are 0. By
-   Gram-Schmidt with the largest rest first. */
+/* How many parameters the answer determines: those that the misfit presses against an end of their range, and of the others
+   the rank of J, whose columns of held parameters are 0. By Gram-Schmidt with the largest rest first. */
 static PetscInt Determined(const Fit *f)
 {
   PetscReal A[HYCO_MAX_QUANTITIES * HYCO_MAX_PARAMETERS], first = 0;
-  PetscInt rank = 0;
+  PetscInt rank = 0, pressed = 0;
 
   for (PetscInt i = 0; i < f->n * f->n_par; i++) A[i] = f->J[i];
+  for (PetscInt p = 0; p < f->n_par; p++) {
+    PetscReal slope = 0, size = 0;
+
+    for (PetscInt k = 0; k < f->n; k++) {
+      slope += f->J[k * f->n_par + p] * f->r[k];
+      size += PetscAbsReal(f->J[k * f->n_par + p] * f->r[k]);
+    }
+    /* Where the targets are met the slope is round-off, and the end is no reason. */
+    if (!(PetscAbsReal(slope) > LEFT * size) || Size(f->n, f->r) < LEFT || !(slope > 0 ? f->x[p] <= 0 : f->x[p] >= 1))
+      continue;
+    pressed++;
+    for (PetscInt k = 0; k < f->n; k++) A[k * f->n_par + p] = 0;
+  }
   for (; rank < PetscMin(f->n, f->n_par); rank++) {
     PetscReal most = 0, q[HYCO_MAX_QUANTITIES];
     PetscInt pivot = 0;
@@ -412,7 +425,7 @@ static PetscInt Determined(const Fit *f)
       for (PetscInt k = 0; k < f->n; k++) A[k * f->n_par + p] -= dot * q[k];
     }
   }
-  return rank;
+  return rank + pressed;
 }
 
 /* The fit works on x in [0, 1]^n; mu is made from it at the end. Which starts are tried depends on the fixed sequence of samples, hence the same answer in every run. */
