@@ -363,7 +363,10 @@ static PetscErrorCode Load(HycoBodiesWork o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define BALANCED 1e-13 /* share of its terms below which work is round-off */
+/* Shares of the loads below which their work, and what is left of it by the forces, is round-off: of the coefficients, which
+   carry that of the interpolation of the loads. */
+#define BALANCED 1e-11
+#define LEFT     1e-12
 
 /* The work of the loads on motion i; 0 where vectors of the basis cancel, as it is of a load that does not act on it. */
 PetscReal HycoBodiesLoadWork(HycoBodiesWork o, PetscInt i)
@@ -1066,7 +1069,7 @@ PetscReal HycoBodiesUnbalanced(HycoBodiesWork o)
       size += PetscAbsReal(z * o->f[k]);
       reach = PetscMax(reach, PetscAbsReal(z));
     }
-    sum = PetscMax(PetscAbsReal(sum) - 16 * PETSC_MACHINE_EPSILON * reach * all, 0);
+    sum = PetscMax(PetscAbsReal(sum) - LEFT * reach * all, 0);
     if (size > 0) most = PetscMax(most, sum / size);
   }
   return most;
