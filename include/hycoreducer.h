@@ -50,6 +50,8 @@ PetscErrorCode HycoROMComparePath(HycoROM model, HycoFOM fom, PetscInt n, const 
    PETSC_INFINITY if a solve did not converge. */
 typedef struct {
   PetscInt n, not_converged;
+  PetscInt
+      loose; /* points at which the position of a body is arbitrary (HycoPrediction): displacements are not judged there */
   PetscReal largest[HYCO_N_ERRORS], median[HYCO_N_ERRORS], mean[HYCO_N_ERRORS];
   PetscInt worst[HYCO_N_ERRORS]; /* the point with the largest */
   PetscReal end[HYCO_N_ERRORS];  /* for paths, the largest at their last listed time; otherwise 0 */

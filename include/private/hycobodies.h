@@ -386,5 +386,6 @@ PetscInt HycoBodiesGrid(HycoSubstructures bodies, PetscInt k, PetscReal theta[])
 /* The residuals at the contacts, recomputed from U and the forces; `stationarity` is that of floating bodies. */
 void HycoBodiesMeasure(HycoROM model, HycoKKT *kkt);
 PetscReal HycoBodiesUnbalanced(HycoBodiesWork work);
+PetscErrorCode HycoBodiesLoose(HycoBodiesWork work, PetscInt n, const PetscReal Lambda[], PetscBool *loose);
 
 #endif

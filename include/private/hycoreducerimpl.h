@@ -321,11 +321,12 @@ PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM 
 
 /* Result of a model at one held-out point, all PetscReal: errors (those of forces before division), for a path at
    its worst time, and at its end; the norms of forces and stress, whether it converged, the number of its group
-   (calibrate.c), the features of the estimates, the time of some repetitions. */
+   (calibrate.c), the features of the estimates, the time of some repetitions; 1 if the position of a body is arbitrary, and
+  displacements are not judged. */
 #define HYCO_HELD_REPEATS 3
 typedef struct _n_HycoHeldOut {
   PetscReal error[HYCO_N_ERRORS], end[HYCO_N_ERRORS], size, rid_size, stress, converged, group, feature[HYCO_FEATURES],
-      seconds[HYCO_HELD_REPEATS];
+      seconds[HYCO_HELD_REPEATS], loose;
 } HycoHeldOut;
 /* By HycoErrorKind, the norm of the error of a prediction, and that of the reference. */
 typedef struct {

@@ -68,6 +68,8 @@ static PetscErrorCode PrintEstimates(HycoScene scene, const HycoPrediction *p, c
 
   PetscFunctionBegin;
   PetscCall(DriverPrintDependent(p->n_dependent, path ? path->n : 0, path ? path->step : NULL));
+  if (p->loose)
+    PetscCall(DriverPrint("warning: the contact forces leave a motion of a body free: its position is arbitrary\n"));
   for (PetscInt k = 0; k < 3; k++) {
     if (estimate[k] >= 0)
       DriverPercent(estimate[k], words[k]);
@@ -117,6 +119,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   cJSON_AddStringToObject(json, "solver", p->method);
   cJSON_AddBoolToObject(json, "converged", p->reason > 0);
   if (p->n_dependent >= 0) cJSON_AddBoolToObject(json, "forces_unique", p->n_dependent == 0);
+  cJSON_AddBoolToObject(json, "position_arbitrary", p->loose);
   ReportNumbers(json, {"n_modes", p->n_modes}, {"n_fe_dofs", p->n_fe_dofs});
   /* Full order has no RID: a report of one would be that of the prediction it replaces. */
   if (!fallback[0]) ReportRID(json, p);

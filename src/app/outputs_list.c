@@ -135,6 +135,8 @@ static const Written written[] = {
     {"report", "solve", "contact.force", "numbers", "force", "of all contacts on the bodies; between bodies 0"},
     {"report", "solve", "contact.moment", "numbers", "moment", "as of supports"},
     {"report", "solve", "balance", "number", "-", "sum of all forces on the bodies, relative to the largest"},
+    {"report", "predict", "position_arbitrary", "flag", "-",
+     "bodies, no history: contact forces leave a motion of a body free"},
     {"report", "solve predict", "outputs.OUTPUT", "number?", "output", "outputs of the scene"},
     {"report", "solve predict", "output_units.OUTPUT", "text", "-",
      "their units, of the scene's `unit`; empty: not known, as of areas"},

@@ -349,6 +349,11 @@ PetscErrorCode DriverJudgeModel(const Search *s, const HycoTraining *t)
     snprintf(fresh, sizeof(fresh), ", %d of them fresh (no solution was added near them)", (int)t->n_fresh);
   PetscCall(DriverPrint("errors at %d held-out points%s: median %s; largest%s %s\n", (int)t->held_out.n, fresh, median,
                         t->n_corners ? ", also at corners of the training," : "", largest));
+  if (t->held_out.loose)
+    PetscCall(
+        DriverPrint("at %d of them contact leaves a motion of a body free: displacements are arbitrary there, and not "
+                    "judged\n",
+                    (int)t->held_out.loose));
   DescribeErrors(IsPath(s), t->held_out.end, end);
   if (IsPath(s))
     PetscCall(

@@ -155,6 +155,11 @@ static PetscErrorCode Compare(Rows *r, const PetscReal mu[], PetscMPIInt of, Hyc
   PetscCall(MeasureU(r, mu, 0, of, square));
   if (r->t->rank == of) row->error[HYCO_ERROR_U] = HycoRelative(PetscSqrtReal(square[0]), PetscSqrtReal(square[1]));
   HycoOnEach(HycoComm(r->t), r->t->rank == of ? CompareRID(r, mu, row) : PETSC_SUCCESS);
+  /* Of an arbitrary position there is no error: full order has chosen another one. */
+  if (r->t->rank == of && r->m->prediction.loose && r->m->prediction.reason > 0) {
+    row->error[HYCO_ERROR_U] = row->error[HYCO_ERROR_U_RID] = 0;
+    row->loose = 1;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -367,6 +372,7 @@ PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], PetscR
     PetscReal seconds[HYCO_HELD_REPEATS];
 
     v->not_converged += rows[k].converged < 0.5;
+    v->loose += rows[k].loose > 0;
     PetscCall(PetscArraycpy(seconds, rows[k].seconds, HYCO_HELD_REPEATS));
     PetscCall(PetscSortReal(HYCO_HELD_REPEATS, seconds));
     /* The median of the repeats: the first one touches cold memory. */

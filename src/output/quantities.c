@@ -118,6 +118,11 @@ PetscBool HycoQuantityOfStress(const HycoQuantity *q)
   return (PetscBool)(q->kind <= HYCO_QUANTITY_MEAN && q->field >= XX);
 }
 
+PetscBool HycoQuantityOfDisplacement(const HycoQuantity *q)
+{
+  return (PetscBool)(q->kind <= HYCO_QUANTITY_MEAN && q->field < XX);
+}
+
 /* A subset of HycoQuantitiesMarkCells(): stresses cost more to store than displacements, and outputs of
    displacements do not need them. */
 PetscErrorCode HycoQuantitiesMarkStressed(HycoScene scene, HycoMesh m, PetscBool stressed[])

@@ -93,6 +93,7 @@ PetscErrorCode HycoROMPredict(HycoROM m, PetscInt n, const PetscReal mu[])
   p->seconds.setup = HycoNow() - begin;
   begin = HycoNow();
   m->remainder = 0;
+  p->loose = PETSC_FALSE;
   PetscUseTypeMethod(m, solve, mu);
   /* a path is reconstructed at its listed times */
   if (m->ops->reconstruct && m->reconstruct && p->reason > 0 && !m->model->scene->n_times)

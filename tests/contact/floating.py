@@ -192,6 +192,11 @@ output: {fx: {force: x, contact: side}, fy: {force: y, contact: floor}}
             rows = np.genfromtxt(self.path('t.csv'), delimiter=',', names=True)
             np.testing.assert_allclose(rows['fx'], 2 * rows['px'], rtol=0, atol=1e-6)
             np.testing.assert_allclose(rows['fy'], 3 * rows['py'], rtol=0, atol=1e-6)
+        for px in (0, 7):  # along the floor nothing holds it without px
+            run = self.run_raw('predict', '-model', 'm.h5', '-mu', f'{px},20,0.003', '-report', self.path('r.json'))
+            with open(self.path('r.json'), encoding='utf-8') as file:
+                report = json.load(file)
+            self.assertEqual((report['position_arbitrary'], report['estimated_error_u'] is None, 'position is arbitrary' in run.stdout), 3 * (px == 0,))
 
     def test_travels(self):
         """A block that contact alone holds at places far apart: as a set each is the single solution, and `check` accepts the range."""

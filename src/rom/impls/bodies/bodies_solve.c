@@ -1075,6 +1075,35 @@ PetscReal HycoBodiesUnbalanced(HycoBodiesWork o)
   return most;
 }
 
+#define HOLDS 1e-10 /* share of the largest force below which a force is round-off */
+
+/* Whether the contacts with a force leave a rigid motion free. By Cholesky's pivots of G^T G over them, G = B Z, relative to
+   the motions' squared lengths over all contacts. */
+PetscErrorCode HycoBodiesLoose(HycoBodiesWork o, PetscInt n, const PetscReal Lambda[], PetscBool *loose)
+{
+  const PetscInt p = o->bodies->p;
+  PetscReal *gram, *all, *g, least = 0;
+  PetscBool held;
+
+  PetscFunctionBegin;
+  *loose = PETSC_FALSE;
+  if (!p) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc3(p * p, &gram, p, &all, p, &g));
+  for (PetscInt k = 0; k < n; k++) least = PetscMax(least, HOLDS * Lambda[k]);
+  for (PetscInt k = 0; k < n; k++) {
+    PetscCall(PetscArrayzero(g, p));
+    for (PetscInt e = o->row_start[k]; e < o->row_start[k + 1]; e++) {
+      for (PetscInt i = 0; i < p; i++) g[i] += o->row[e] * o->Z[o->row_at[e] * p + i];
+    }
+    for (PetscInt i = 0; i < p; i++) all[i] += g[i] * g[i];
+    for (PetscInt i = 0; i < p * p && Lambda[k] > least; i++) gram[i] += g[i / p] * g[i % p];
+  }
+  PetscCall(HycoCholesky("U", p, gram, all, &held));
+  *loose = (PetscBool)!held;
+  PetscCall(PetscFree3(gram, all, g));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* |L~|_W^2 = sum of f.(C f / kappa), from the displacements by the forces. `gram` holds the errors of R in the
    norm of C^-1: that is the term |B (R~ - R) c|_{W^-1} of the bound, kappa scaling C and R alike. */
 PetscReal HycoBodiesBound(HycoBodiesWork o, PetscReal *norm)
