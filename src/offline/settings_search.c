@@ -354,9 +354,10 @@ static PetscBool Affords(Search *s, const HycoReducerSettings *settings)
              "on, -hyco_search_exhaustive tries all",
              (int)s->n, (double)s->spent, (double)s->budget, (double)(enough < 1 ? enough : PetscCeilReal(enough)));
   else
-    snprintf(why, sizeof(why),
-             "-hyco_search_budget 0 allows %d settings; a larger one, or -hyco_search_exhaustive, lets the search go on",
-             LEAST);
+    snprintf(
+        why, sizeof(why),
+        "-hyco_search_budget 0 allows %d settings; a larger one, or -hyco_search_exhaustive, lets the search go on",
+        LEAST);
   LeaveOut(s, settings->rid ? "further settings" : settings->type, PETSC_TRUE, why);
   s->ended = PETSC_TRUE;
   return PETSC_FALSE;
