@@ -702,7 +702,7 @@ class Draft:
         """The draft; afterwards `left` is complete."""
         self.history = self.inelastic() or self.rubs() or len(self.steps) > 1
         if self.rubs():
-            self.notes.append("friction is solved at full order and by models of bodies; other models need a draft made with --frictionless. More listed times follow its path more closely.")
+            self.notes.append("friction is solved at full order and by models of bodies, with *TIE by hybrid models; --frictionless leaves it out. More listed times follow its path more closely.")
         self.steps = self.steps or [{"period": 1.0, "kind": "", "ramp": True}]
         sections = list(self.entries())
         lines = [f"# Draft from {self.name}. Displacements are small; bodies are in the deck's units.",
@@ -720,9 +720,12 @@ class Draft:
                 lines += [f"  {key}: {value}" + (f"   # {comment}" if comment else "") for key, value, comment in rows]
         if self.contacts:
             lines.append("output:")
+            taken = set()
             for name in self.contacts:
+                output = self.free_name(("" if name[0].isalpha() else "contact_") + re.sub("[^A-Za-z0-9_]", "_", name), taken)
+                taken.add(output)
                 axes = "y" if self.formulation() == "axisymmetric" else AXES[:self.dim()]
-                lines += [f"  {name}_peak: {{max: contact_pressure, contact: {name}}}", *(f"  {name}_{c}: {{force: {c}, contact: {name}}}" for c in axes)][:16 // len(self.contacts)]
+                lines += [f"  {output}_peak: {{max: contact_pressure, contact: {name}}}", *(f"  {output}_{c}: {{force: {c}, contact: {name}}}" for c in axes)][:16 // len(self.contacts)]
         if self.history:
             times, t = [0.0], 0.0
             for step in self.steps:

@@ -2,6 +2,7 @@
 #ifndef HYCOFOMIMPL_H
 #define HYCOFOMIMPL_H
 
+#include <hycoslip.h>
 #include <hycocontactimpl.h>
 #include <hycofom.h>
 #include <hycoh5.h>
@@ -137,10 +138,11 @@ PetscErrorCode HycoFOMTakeOutReleased(HycoFOM fom, Vec u);
 /* Number of closed contacts of the last solution whose rows of B depend on the others; if it is not 0, the contact
    forces are not unique. Collective. */
 PetscErrorCode HycoFOMCountDependent(HycoFOM fom, PetscInt *dependent);
-/* The same for the rows and gaps of m contacts on one process, displacements u (n_dof) and forces lambda. */
+/* The same for m rows and their gaps on one process, displacements u (n_dof) and normal forces lambda; slip: of contacts
+   with friction, whose rows have tangents; else NULL: a row for each contact. */
 PetscErrorCode HycoRowsCountDependent(PetscInt m, PetscInt start[], PetscInt dof[], PetscReal value[], PetscReal gap[],
                                       PetscInt n_dof, const PetscReal u[], const PetscReal lambda[],
-                                      PetscInt *dependent);
+                                      const HycoSlip *slip, PetscInt *dependent);
 /* Creates distributed vectors of the motions; VecDestroyVecs() destroys them. Collective. */
 PetscErrorCode HycoFOMMotionVectors(HycoFOM fom, const HycoMotions *motions, Vec **v);
 /* Finds the motions of `soft` at the present K, and forgets them. Collective. */

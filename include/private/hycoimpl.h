@@ -176,6 +176,8 @@ void HycoPointEnd(void *before);
 /* Makes BLAS allocate its memory now, or fails: without memory, OpenBLAS would try again without end. On this
    process alone. */
 PetscErrorCode HycoReserveBLAS(void);
+/* Of this machine, in bytes; 0: not known. */
+PetscReal HycoMachineMemory(void);
 
 #define HYCO_NOTHING (16 * PETSC_MACHINE_EPSILON) /* share of its terms up to which a difference may be round-off */
 

@@ -179,6 +179,8 @@ PetscErrorCode HycoFrictionAssemble(HycoFOM fom);
 PetscErrorCode HycoFrictionWork(HycoFOM fom, PetscReal *work);
 /* The accepted step becomes the state of the contacts. */
 PetscErrorCode HycoFrictionAccept(HycoFOM fom);
+/* The contacts' rows and states at the last accepted time. */
+const HycoSlip *HycoFrictionSlip(HycoFriction friction);
 /* Sets the results of a listed time. */
 PetscErrorCode HycoFrictionMeasure(HycoFOM fom, HycoStep *step);
 /* The state in a checkpoint. `load` after the path is assembled at the checkpoint's time. */

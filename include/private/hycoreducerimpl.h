@@ -146,6 +146,7 @@ struct _p_HycoReducer {
 };
 /* Fails (no model) if the scene has contacts whose rows the type does not take. */
 PetscErrorCode HycoReducerCheckContacts(HycoReducer t, const HycoROM type);
+PetscErrorCode HycoReducerTakesCubature(HycoReducer t, PetscBool *takes);
 
 /* The scene's variables of column k of the snapshots: all of mu (HYCO_MAX_PARAMETERS). */
 PetscErrorCode HycoReducerColumn(HycoReducer t, PetscInt k, PetscReal mu[]);

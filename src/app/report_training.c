@@ -260,7 +260,6 @@ PetscErrorCode DriverSetSearch(Search *s, HycoScene scene, HycoReducer reducer, 
 static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
 {
   const PetscReal *limit = s->limit;
-  const PetscBool hybrid = (PetscBool)(IsPath(s) && t->chosen.settings.rid);
 
   PetscFunctionBegin;
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
@@ -271,7 +270,7 @@ static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
     DriverPercent(t->held_out.largest[j], reached);
     DriverPercent(limit[j], asked);
     PetscCall(DriverMissed(
-        "the error of %s is %s at the worst of %d held-out points, and %s %s; the model is written; %s%s%s%s",
+        "the error of %s is %s at the worst of %d held-out points, and %s %s; the model is written; %s%s%s",
         j == HYCO_ERROR_U           ? "u"
         : j == HYCO_ERROR_LAMBDA    ? "the contact forces"
         : j == HYCO_ERROR_INELASTIC ? "the inelastic strain"
@@ -281,8 +280,7 @@ static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
         s->on ? "give more training points, a larger -target_max_added, or a looser target"
               : "give more training points, with the ends of the ranges among them, let training add them (-target_u "
                 "5e-3 "
-                "-target_lambda 3e-2), or set looser targets",
-        hybrid ? "; or try -hyco_model_type cubature (docs/models.md)" : ""));
+                "-target_lambda 3e-2), or set looser targets"));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -107,9 +107,10 @@ PetscErrorCode DriverPrintDependent(PetscInt n_dependent, PetscInt n, const Hyco
     PetscCall(DriverPrint("%s %.10g", before, (double)step[k].t));
     before = ",";
   }
-  PetscCall(DriverPrint(": %d closed contact%s linearly on the others (more slaves than their masters' unknowns); "
-                        "without friction, displacements and resultants are unique\n",
-                        (int)n_dependent, n_dependent > 1 ? "s depend" : " depends"));
+  PetscCall(
+      DriverPrint(": %d closed contact%s linearly on the others (more slaves than their masters' unknowns, or friction "
+                  "of two contacts at a node); without friction, displacements and resultants are unique\n",
+                  (int)n_dependent, n_dependent > 1 ? "s depend" : " depends"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

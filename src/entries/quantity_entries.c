@@ -37,7 +37,8 @@ PetscErrorCode HycoSceneReadQuantity(HycoScene s, PetscInt entry, const char nam
   HycoQuantity *q = NULL;
 
   PetscFunctionBegin;
-  HycoCheck(HycoIsVariableName(name), "%s: \"%s\" cannot name an output; use letters, digits and _", s->key[entry],
+  HycoCheck(HycoIsVariableName(name),
+            "%s: \"%s\" cannot name an output; use letters, digits and _, and none of x, y, z, pi", s->key[entry],
             name);
   for (PetscInt k = 0; k < s->n_quantities; k++) {
     if (strcasecmp(s->quantity[k].name, name) == 0) q = &s->quantity[k];

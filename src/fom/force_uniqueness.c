@@ -1,9 +1,11 @@
 /*
-  Whether the contact forces are unique: they are if the rows of B of the closed contacts are independent. Slaves whose
-  own unknowns are all fixed (a rigid tool) may be more than their masters' unknowns can distinguish: then forces can be
-  redistributed among them without any other change.
+  Whether the contact forces are unique: they are if the rows of B of the closed contacts are independent, with the
+  tangents of those that stick. Slaves whose own unknowns are all fixed (a rigid tool) may be more than their masters'
+  unknowns can distinguish: then forces can be redistributed among them without any other change. So can friction and
+  normal forces of contacts with one slave node.
 */
 #include <hycofomimpl.h>
+#include <hycopath.h>
 #include <hycolcp.h>
 
 typedef struct {
@@ -11,11 +13,29 @@ typedef struct {
   PetscReal *value, *gap;
 } Rows;
 
-/* Marks contacts whose gap is closed, and that have an unknown. The scale is of all contacts, so that round-off counts
+/* By row, from the contacts' normal forces: a tangent that sticks has that of its normal, since it may give forces to
+   others, and others have 0. slip: NULL: a row for each contact. */
+static void RowForces(const HycoSlip *slip, PetscInt m, const PetscReal lambda[], PetscReal force[],
+                      PetscBool tangent[])
+{
+  for (PetscInt k = 0; k < (slip ? slip->n : m); k++) {
+    const PetscInt row = slip ? slip->row[k] : k;
+    const PetscBool sticks = (PetscBool)(slip && slip->shear.state[k] == HYCO_STICK);
+
+    force[row] = lambda[k];
+    tangent[row] = PETSC_FALSE;
+    for (PetscInt i = row + 1; slip && i < slip->row[k + 1]; i++) {
+      force[i] = sticks ? PetscMax(lambda[k], 0) : 0;
+      tangent[i] = PETSC_TRUE;
+    }
+  }
+}
+
+/* Marks rows of contacts whose gap is closed, and that have an unknown. The scale is of all contacts, so that round-off counts
    equally everywhere; two passes, since it is known after the first. 1e-9 of it: a gap that the solver has left by
    round-off is closed. */
 static PetscErrorCode MarkClosed(MPI_Comm comm, const Rows *r, const PetscReal u[], const PetscReal lambda[],
-                                 PetscBool in[])
+                                 const PetscBool tangent[], PetscBool in[])
 {
   PetscReal scale = 0;
 
@@ -28,9 +48,9 @@ static PetscErrorCode MarkClosed(MPI_Comm comm, const Rows *r, const PetscReal u
         left -= r->value[j] * u[r->dof[j]];
         size += PetscAbsReal(r->value[j] * u[r->dof[j]]);
       }
-      scale = PetscMax(scale, size);
+      if (!tangent[k]) scale = PetscMax(scale, size);
       /* A row without entries resists nothing. */
-      in[k] = (PetscBool)(r->start[k + 1] > r->start[k] && (lambda[k] > 0 || left <= 1e-9 * scale));
+      in[k] = (PetscBool)(r->start[k + 1] > r->start[k] && (lambda[k] > 0 || (!tangent[k] && left <= 1e-9 * scale)));
     }
     if (!pass) HycoAllreduce(&scale, 1, MPIU_REAL, MPI_MAX, comm);
   }
@@ -172,14 +192,15 @@ static PetscErrorCode Dependent(const Rows *r, PetscInt *dependent)
 }
 
 /* The same for the rows that are marked, on all ranks. A row without force cannot exchange it with others. */
-static PetscErrorCode CountRest(HycoFOM f, const Rows *r, const PetscBool in[], PetscInt *dependent)
+static PetscErrorCode CountRest(HycoFOM f, const Rows *r, const PetscReal lambda[], const PetscBool in[],
+                                PetscInt *dependent)
 {
   Rows rest = {0, NULL, NULL, NULL, NULL};
   PetscBool pressed = PETSC_FALSE;
 
   PetscFunctionBegin;
   *dependent = 0;
-  for (PetscInt k = 0; k < r->m; k++) pressed = (PetscBool)(pressed || (in[k] && f->lambda[k] > 0));
+  for (PetscInt k = 0; k < r->m; k++) pressed = (PetscBool)(pressed || (in[k] && lambda[k] > 0));
   HycoAllreduce(&pressed, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
   /* Dependent rows without any force: forces 0 are unique. */
   if (!pressed) PetscFunctionReturn(PETSC_SUCCESS);
@@ -191,27 +212,37 @@ static PetscErrorCode CountRest(HycoFOM f, const Rows *r, const PetscBool in[], 
 }
 
 /* Rows that share no unknown with another closed row are independent; only the rest needs a rank. */
-static PetscErrorCode Count(HycoFOM f, Rows *r, PetscBool in[], PetscInt *dependent)
+static PetscErrorCode Count(HycoFOM f, const HycoSlip *slip, Rows *r, PetscReal force[], PetscBool tangent[],
+                            PetscBool in[], PetscInt *dependent)
 {
   PetscFunctionBegin;
-  HycoOnEach(HycoComm(f), HycoContactRows(f->fe_surface, &f->pairs, r->start, r->dof, r->value, r->gap));
-  PetscCall(MarkClosed(HycoComm(f), r, f->u_surface, f->lambda, in));
+  if (slip)
+    HycoOnEach(HycoComm(f), HycoContactTangentRows(f->fe_surface, &f->pairs, slip->row, f->u_surface, slip->tangent,
+                                                   r->start, r->dof, r->value, r->gap));
+  else
+    HycoOnEach(HycoComm(f), HycoContactRows(f->fe_surface, &f->pairs, r->start, r->dof, r->value, r->gap));
+  RowForces(slip, r->m, f->lambda, force, tangent);
+  PetscCall(MarkClosed(HycoComm(f), r, f->u_surface, force, tangent, in));
   PetscCall(Peel(f, r, in));
-  PetscCall(CountRest(f, r, in, dependent));
+  PetscCall(CountRest(f, r, force, in, dependent));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* By how many the rows of closed contacts exceed their rank: contact forces are unique if 0. Collective. */
 PetscErrorCode HycoFOMCountDependent(HycoFOM f, PetscInt *dependent)
 {
-  const PetscInt m = f->pairs.n;
+  const HycoSlip *slip = f->friction ? HycoFrictionSlip(f->friction) : NULL;
+  const PetscInt m = slip ? slip->row[slip->n] : f->pairs.n;
   const size_t entries = (size_t)HycoPairsWidth(&f->pairs) * (size_t)f->fe->dim * (size_t)m;
   Rows r = {m, NULL, NULL, NULL, NULL};
-  PetscBool *in;
+  PetscReal *force;
+  PetscBool *in, *tangent;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc5(m + 1, &r.start, entries, &r.dof, entries, &r.value, m, &r.gap, m, &in));
-  HycoFinally(Count(f, &r, in, dependent), PetscCall(PetscFree5(r.start, r.dof, r.value, r.gap, in)));
+  PetscCall(
+      PetscMalloc7(m + 1, &r.start, entries, &r.dof, entries, &r.value, m, &r.gap, m, &in, m, &force, m, &tangent));
+  HycoFinally(Count(f, slip, &r, force, tangent, in, dependent),
+              PetscCall(PetscFree7(r.start, r.dof, r.value, r.gap, in, force, tangent)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -239,28 +270,30 @@ static PetscErrorCode TakeRest(const Rows *r, const PetscBool in[], Rows *rest)
 /* The same for the rows of a reduced system, on one process; dof < n_dof. */
 PetscErrorCode HycoRowsCountDependent(PetscInt m, PetscInt start[], PetscInt dof[], PetscReal value[], PetscReal gap[],
                                       PetscInt n_dof, const PetscReal u[], const PetscReal lambda[],
-                                      PetscInt *dependent)
+                                      const HycoSlip *slip, PetscInt *dependent)
 {
   Rows r = {m, start, dof, value, gap}, rest = {0, NULL, NULL, NULL, NULL};
-  PetscReal *count;
-  PetscBool *in, pressed = PETSC_FALSE;
+  PetscReal *count, *force;
+  PetscBool *in, *tangent, pressed = PETSC_FALSE;
 
   PetscFunctionBegin;
   *dependent = 0;
-  PetscCall(PetscMalloc1(m + 1, &in));
+  PetscCall(PetscMalloc3(m, &in, m, &force, m, &tangent));
+  RowForces(slip, m, lambda, force, tangent);
   PetscCall(PetscCalloc1(n_dof + 1, &count));
-  PetscCall(MarkClosed(PETSC_COMM_SELF, &r, u, lambda, in));
+  PetscCall(MarkClosed(PETSC_COMM_SELF, &r, u, force, tangent, in));
   for (PetscInt k = 0; k < m; k++) {
     for (PetscInt j = start[k]; in[k] && j < start[k + 1]; j++) count[dof[j]]++;
   }
   /* Once: on one process rows leave in one sweep, and those that stay are few. */
   (void)PeelOwn(&r, count, in);
-  for (PetscInt k = 0; k < m; k++) pressed = (PetscBool)(pressed || (in[k] && lambda[k] > 0));
+  for (PetscInt k = 0; k < m; k++) pressed = (PetscBool)(pressed || (in[k] && force[k] > 0));
   /* Without a force nothing can be redistributed. */
   if (pressed) {
     PetscCall(TakeRest(&r, in, &rest));
     PetscCall(Dependent(&rest, dependent));
   }
-  HycoFreeAll(&rest.start, &rest.dof, &rest.value, &in, &count);
+  PetscCall(PetscFree3(in, force, tangent));
+  HycoFreeAll(&rest.start, &rest.dof, &rest.value, &count);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -364,6 +364,11 @@ PetscErrorCode HycoFrictionAccept(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+const HycoSlip *HycoFrictionSlip(HycoFriction r)
+{
+  return &r->slip;
+}
+
 /* Sums over the contacts of all ranks: the work since the path began and the number of contacts that slip now.
    Collective. Both sums in one reduction. */
 PetscErrorCode HycoFrictionMeasure(HycoFOM f, HycoStep *s)

@@ -7,6 +7,9 @@
 #include <petscdmplextransform.h>
 #include <string.h>
 
+/* Memory of an interpolated DM for each of its cells while it is refined: about 100 for each point. */
+#define BYTES(dim) (100 * (PetscReal)(1 << (dim)))
+
 /* The facet of a cell with this number, as a point of the interpolated DM. Compared as sets of vertices, since
    DMPlex orders those of a face in its own way. -1: none. */
 static PetscErrorCode FacetPoint(DM dm, HycoCellType type, PetscInt nv, PetscInt nf, PetscInt cell, PetscInt number,
@@ -350,6 +353,27 @@ static PetscErrorCode CheckShapes(DM dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Refuses a number of cells for which a rank alone has too little memory. Collective. */
+static PetscErrorCode CheckMemory(DM dm, PetscInt times)
+{
+  const PetscReal memory = HycoMachineMemory();
+  PetscReal most, all;
+  PetscInt c0, c1, dim;
+
+  PetscFunctionBegin;
+  PetscCall(DMGetDimension(dm, &dim));
+  PetscCall(DMPlexGetHeightStratum(dm, 0, &c0, &c1));
+  most = all = (PetscReal)(c1 - c0) * PetscPowReal(2, (PetscReal)(dim * times));
+  HycoAllreduce(&most, 1, MPIU_REAL, MPI_MAX, HycoComm(dm));
+  HycoAllreduce(&all, 1, MPIU_REAL, MPI_SUM, HycoComm(dm));
+  HycoCheck(
+      !(memory > 0 && BYTES(dim) * most > memory),
+      "scene_refine: cells that are halved %d times are %.2g, and take at least %.2g GB; this machine has %.2g GB: "
+      "refine less",
+      (int)times, (double)all, (double)(BYTES(dim) * all / 1e9), (double)(memory / 1e9));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* On one process, numbers the cells by type, as DMPlexTransform needs them; distribution does so on several. */
 static PetscErrorCode SortByType(DM *dm)
 {
@@ -401,6 +425,7 @@ PetscErrorCode HycoPlexRefine(DM *dm, HycoScene scene, PetscInt times)
   PetscFunctionBegin;
   if (!times) PetscFunctionReturn(PETSC_SUCCESS);
   HycoOnEach(PetscObjectComm((PetscObject)*dm), CheckShapes(*dm));
+  PetscCall(CheckMemory(*dm, times));
   PetscCall(SortByType(dm));
   PetscCall(Interpolate(dm, scene));
   for (PetscInt k = 0; k < times; k++) PetscCall(RefineOnce(dm));

@@ -439,12 +439,33 @@ static PetscErrorCode CheckForces(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether a cubature takes the scene's contacts and ties, for advice to try it. Not collective. */
+PetscErrorCode HycoReducerTakesCubature(HycoReducer t, PetscBool *takes)
+{
+  HycoROM type;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMCreate(&type));
+  PetscCall(HycoROMSetType(type, "cubature"));
+  *takes = (PetscBool)(t->scene->n_times && !t->scene->n_ties);
+  for (PetscInt k = 0; k < t->scene->n_contacts; k++) {
+    const HycoContact contact = t->scene->contact[k];
+
+    *takes = (PetscBool)(*takes && (type->model->traits.integrals || !contact->integrated) &&
+                         (type->model->traits.friction || !contact->friction));
+  }
+  PetscCall(HycoROMDestroy(&type));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Refuses a model whose errors on its own training solutions reach one half. */
 static PetscErrorCode CheckUseful(HycoReducer t, HycoROM m)
 {
   char worst[HYCO_LINE] = "";
+  PetscBool cubature;
 
   PetscFunctionBegin;
+  PetscCall(HycoReducerTakesCubature(t, &cubature));
   /* `!(x < 0.5)` also refuses NaN. */
   if (!(m->model->numbers[1] < 0.5)) HycoReducerNameWorst(t, worst);
   HycoCheckModel(m->model->numbers[1] < 0.5,
@@ -452,7 +473,7 @@ static PetscErrorCode CheckUseful(HycoReducer t, HycoROM m)
                  "condition %.0e)%s: enlarge the RID (-hyco_rid_layers 1, -hyco_rid_contact_extension LENGTH), or use "
                  "fewer modes (-hyco_pod_tol)%s",
                  100 * (double)m->model->numbers[1], (int)m->model->mesh->n_cells, (int)m->model->l,
-                 (double)m->model->numbers[0], worst, m->model->scene->n_times ? ", or -hyco_model_type cubature" : "");
+                 (double)m->model->numbers[0], worst, cubature ? ", or -hyco_model_type cubature" : "");
   PetscCall(CheckForces(t, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -94,6 +94,9 @@ static PetscErrorCode MeasureStep(Rows *r, const PetscReal mu[], PetscInt step, 
   PetscCall(HycoROMMeasureRID(r->m, r->c.rid[0], r->c.rid[1], r->c.rid[2], lambda, lost));
   /* Squares of the whole mesh, which all ranks have summed. */
   lost[HYCO_ERROR_U] = (HycoLost){PetscSqrtReal(square[0]), PetscSqrtReal(square[1])};
+  /* Forces that are not unique differ without an error. */
+  if (r->m->trace.history.step[step].n_dependent > 0)
+    lost[HYCO_ERROR_LAMBDA].lost = lost[HYCO_ERROR_LAMBDA_RID].lost = 0;
   PetscCall(PetscFree(lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

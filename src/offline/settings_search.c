@@ -340,14 +340,24 @@ static PetscErrorCode BuildAndJudge(Search *s, PetscBool all, HycoAttempt *a)
    are larger, so that this errs to the side of one more attempt. */
 static PetscBool Affords(Search *s, const HycoReducerSettings *settings)
 {
+  const PetscReal given = s->t->search_budget;
+  PetscReal enough;
   char why[HYCO_LINE];
 
   /* The first attempts are always made: without any there is no model. */
   if (s->n_models < LEAST || s->spent + s->last <= s->budget) return PETSC_TRUE;
-  snprintf(why, sizeof(why),
-           "%d settings took %.1e of the %.1e operations that the search may take; -hyco_search_budget %g allows twice "
-           "as many, -hyco_search_exhaustive all",
-           (int)s->n, (double)s->spent, (double)s->budget, 2 * (double)s->t->search_budget);
+  /* Twice what was spent, so that a search that takes it goes on. */
+  enough = given * 2 * (s->spent - s->own + s->last) / (s->budget - s->own);
+  if (given > 0)
+    snprintf(why, sizeof(why),
+             "%d settings took %.1e of the %.1e operations that the search may take; -hyco_search_budget %g lets it go "
+             "on, -hyco_search_exhaustive tries all",
+             (int)s->n, (double)s->spent, (double)s->budget, (double)(enough < 1 ? enough : PetscCeilReal(enough)));
+  else
+    snprintf(
+        why, sizeof(why),
+        "-hyco_search_budget 0 allows %d settings; a larger one, or -hyco_search_exhaustive, lets the search go on",
+        LEAST);
   LeaveOut(s, settings->rid ? "further settings" : settings->type, PETSC_TRUE, why);
   s->ended = PETSC_TRUE;
   return PETSC_FALSE;
@@ -1108,7 +1118,9 @@ static PetscErrorCode Advise(Search *s, HycoTraining *report)
 {
   HycoReducer t = s->t;
   PetscInt by;
+  static const char other[] = "try -hyco_model_type cubature (docs/models.md)";
   char values[HYCO_LINE / 4] = "", *next = report->next;
+  PetscBool cubature = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(FindTelling(s, t->samples, &by));
@@ -1131,6 +1143,11 @@ static PetscErrorCode Advise(Search *s, HycoTraining *report)
   if (values[0] && strlen(next) + strlen(values) + 5 < sizeof(report->next)) {
     if (next[0]) strcat(next, "; or ");
     strcat(next, values);
+  }
+  if (report->chosen.settings.rid) PetscCall(HycoReducerTakesCubature(t, &cubature));
+  if (cubature && strlen(next) + strlen(other) + 5 < sizeof(report->next)) {
+    if (next[0]) strcat(next, "; or ");
+    strcat(next, other);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

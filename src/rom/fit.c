@@ -445,9 +445,12 @@ PetscErrorCode HycoROMFit(HycoROM m, PetscInt n, const PetscInt output[], const 
             (int)n_starts);
   HycoCheck(!strcmp(type, HYCO_FIT_BRGN) || !strcmp(type, HYCO_FIT_BLMVM),
             "the type of a fit is \"%s\"; it must be " HYCO_FIT_BRGN " or " HYCO_FIT_BLMVM, type);
-  for (PetscInt k = 0; k < n; k++)
+  for (PetscInt k = 0; k < n; k++) {
     HycoCheck(output[k] >= 0 && output[k] < (scene->n_times ? 2 : 1) * scene->n_quantities,
               "there is no output %d; the model has %d", (int)output[k], (int)scene->n_quantities);
+    HycoCheck(!PetscIsInfOrNanReal(target[k]), "the target of %s is %g; a finite number is expected",
+              scene->quantity[output[k] % scene->n_quantities].name, (double)target[k]);
+  }
   PetscCall(SetRanges(&f, held, &n_free));
   *fit = (HycoFit){.n_starts = n_starts, .n_free = n_free};
   PetscCall(PetscMalloc1(n_starts * f.n_par + 1, &starts));

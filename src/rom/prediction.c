@@ -108,7 +108,7 @@ static PetscErrorCode MeasureContacts(HycoROM m, HycoPrediction *p)
   }
   if (m->model->traits.surfaces && p->reason > 0 && !m->trace.n_listed)
     PetscCall(HycoRowsCountDependent(m->model->pairs.n, m->rows.start, m->rows.dof, m->rows.value, m->rows.gap,
-                                     m->fe->n_dof, m->U, m->Lambda, &p->n_dependent));
+                                     m->fe->n_dof, m->U, m->Lambda, NULL, &p->n_dependent));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

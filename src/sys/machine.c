@@ -1,10 +1,11 @@
-/* Checks of the environment: a locale with a decimal point, memory for BLAS. */
+/* Checks of the environment: a locale with a decimal point, memory of the machine and for BLAS. */
 #define _DEFAULT_SOURCE /* MAP_ANONYMOUS */
 #include <hycoimpl.h>
 #include <locale.h>
 #include <petscblaslapack.h>
 #include <stdlib.h>
 #include <sys/mman.h>
+#include <unistd.h>
 
 /* OpenBLAS allocates this much address space at its first call, and tries without end if it cannot. */
 #define BLAS_BUFFER (((size_t)136) << 20)
@@ -31,6 +32,14 @@ double HycoNumber(const char text[], char **end)
 
   HycoPointEnd(before);
   return number;
+}
+
+/* In bytes; 0: not known. */
+PetscReal HycoMachineMemory(void)
+{
+  const long pages = sysconf(_SC_PHYS_PAGES), size = sysconf(_SC_PAGESIZE);
+
+  return pages > 0 && size > 0 ? (PetscReal)pages * (PetscReal)size : 0;
 }
 
 /* The factorisation makes BLAS allocate its buffers now, where a lack of memory can be reported. OpenBLAS ends the

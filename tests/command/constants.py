@@ -35,6 +35,7 @@ class Constants(Case):
         """Circular constants, and those with the name of a parameter or a variable, are refused."""
         for old, new, text in (('thousand: 10^3', 'thousand: soft', 'must not be circular'), ('one: "x < 1e9 ? 1 : 2"', 'press: 1', 'name of a parameter'),
                                ('one: "x < 1e9 ? 1 : 2"', 'one: y*nothing', 'nothing, which is unknown'), ('thousand: 10^3', 'x: 3', 'cannot name a constant'),
+                               ('constant: {', 'output: {x: {max: mises}}\nconstant: {', 'none of x, y, z, pi'),
                                ('foundation_base: {y: 0}', 'foundation_base: {y: 0}\n  "foundation_base,block_top": {y: 0}', 'remove one of them')):
             with self.subTest(new=new):
                 self.assertIn(old, self.named())

@@ -212,13 +212,15 @@ class Mixed(Case):
                 self.near(report['outputs']['hold'], 2 * 1.7, 1e-10)
 
     def test_refused(self):
-        """Tetrahedra at a hexahedron's face; pyramids that would be refined: one line with the remedy on each number of ranks."""
+        """Tetrahedra at a hexahedron's face; pyramids that would be refined; more cells than the machine has memory for: one line with the remedy on each number of ranks."""
         cube = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
         msh(self.path('bad.msh'), [*cube, (0.5, 0.5, 2)], [(5, 1, range(1, 9)), (4, 1, (5, 6, 7, 9)), (4, 1, (5, 7, 8, 9))], {1: (3, 'block')})
         with open(self.path('bad.yaml'), 'w', encoding='ascii') as f:
             f.write('scene: {mesh: bad.msh}\nbody: {block: {young: 1}}\n')
+        deep = os.path.join(SOURCE, 'examples', 'roller3d')
         for ranks in (0, 3):
-            for args, said in ((('bad.yaml',), 'share three of the four nodes of a face'), ((self.scenes[3], '-scene_refine', '1'), 'the mesh has pyramids')):
+            for args, said in ((('bad.yaml',), 'share three of the four nodes of a face'), ((self.scenes[3], '-scene_refine', '1'), 'the mesh has pyramids'),
+                               ((deep, '-scene_refine', '12'), 'refine less')):
                 run = self.run_raw('check', '-scene', *args, ranks=ranks)
                 self.assertEqual((run.returncode, run.stderr.count('hyco: error')), (1, 1), run.stderr)
                 self.assertIn(said, run.stderr)

@@ -281,6 +281,10 @@ class Decks(Case):
         self.assertIn('scene.yaml is there already', error)
         checked = self.run_raw('check', '-scene', folder)
         self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
+        _, folder = self.convert('dots', text.replace('Down', 'Block-1.Down'), 0, '--frictionless')
+        self.hyco('check', '-scene', folder)
+        with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
+            self.assertIn('block_1_down_up_peak: {', file.read())
 
     def test_friction(self):
         """*FRICTION of the interaction of a contact pair is friction of this contact, and the draft has a history: a block that is pressed and drawn slips with T = mu N.

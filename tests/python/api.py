@@ -197,7 +197,7 @@ class Python(Case):
             again = model.fit(targets, start=[0.03, 1000], kind='blmvm')
             self.assertEqual(again.starts, 1)
             self.assertLess(again.misfit, 1e-5)
-            for bad in (lambda: model.fit({'nothing': 1}), lambda: model.fit({}), lambda: model.fit(targets, kind='newton'),
+            for bad in (lambda: model.fit({'nothing': 1}), lambda: model.fit({}), lambda: model.fit({'lift': float('nan')}), lambda: model.fit(targets, kind='newton'),
                         lambda: model.fit(targets, hold={'none': 1}), lambda: model.fit(targets, hold={names[0]: 1e9})):
                 with self.assertRaises(self.hyco_py.Error) as error:
                     bad()

@@ -90,6 +90,10 @@ class SearchLimits(Ring):
         report, rows = self.search(ROPE, 'usual', *args, status=3)
         self.assertGreater(len(rows), 4)
         self.assertGreater(report['search']['operations'], 0)
+        few, _ = self.search(ROPE, 'small', *args, '-hyco_search_budget', 1e-9, status=3)
+        enough = re.search(r'-hyco_search_budget (\S+) lets it go on', few['search']['not_tried']['further settings'])[1]
+        _, more = self.search(ROPE, 'enough', *args, '-hyco_search_budget', enough, status=3)
+        self.assertGreater(len(more), few['search']['attempts'])
 
     def test_many_contacts(self):
         """801 contacts, gaps and loads as parameters: one factor. A model of bodies is tried and chosen; its forces are those of full order."""

@@ -214,6 +214,7 @@ static PetscErrorCode Record(HycoPath p)
 {
   HycoROM m = (HycoROM)p->ctx;
   HycoBodiesPath w = (HycoBodiesPath)m->work;
+  const HycoRows *rows = w->surface.rows;
   const PetscScalar *alpha;
 
   PetscFunctionBegin;
@@ -228,8 +229,9 @@ static PetscErrorCode Record(HycoPath p)
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
   PetscCall(HycoTraceRecord(m, PETSC_TRUE, p->begin, &p->now));
   if (w->friction) PetscCall(RecordFriction(m, &p->now));
-  PetscCall(HycoRowsCountDependent(m->model->pairs.n, m->rows.start, m->rows.dof, m->rows.value, m->rows.gap,
-                                   m->fe->n_dof, m->U, m->Lambda, &p->now.n_dependent));
+  PetscCall(HycoRowsCountDependent(w->surface.n, rows->start, rows->dof, rows->value, rows->gap, m->fe->n_dof, m->U,
+                                   m->Lambda, w->friction ? HycoBodiesFrictionSlip(w->friction) : NULL,
+                                   &p->now.n_dependent));
   PetscCall(PetscArraycpy(w->motions + p->n_steps * w->bodies.bodies->p, w->bodies.x, w->bodies.bodies->p));
   p->steps[p->n_steps++] = p->now;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
