@@ -336,6 +336,21 @@ static PetscErrorCode BuildAndJudge(Search *s, PetscBool all, HycoAttempt *a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether an attempt gave a model of any use. */
+static PetscBool IsUseful(const HycoAttempt *a)
+{
+  return (PetscBool)(!a->failure[0] && (a->beaten_by || a->held_out.largest[HYCO_ERROR_U] < USELESS));
+}
+
+/* Whether a type with modes of its own has given one, with which a search may end that finds no other. */
+static PetscBool Stands(const Search *s)
+{
+  for (PetscInt k = 0; k < s->n_own; k++) {
+    if (IsUseful(&s->attempt[k])) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
 /* Whether the budget has room for an attempt like the last one. By the last attempt's work: later ones of a kind
    are larger, so that this errs to the side of one more attempt. */
 static PetscBool Affords(Search *s, const HycoReducerSettings *settings)
@@ -345,7 +360,8 @@ static PetscBool Affords(Search *s, const HycoReducerSettings *settings)
   char why[HYCO_LINE];
 
   /* The first attempts are always made: without any there is no model. */
-  if (s->n_models < LEAST || s->spent + s->last <= s->budget) return PETSC_TRUE;
+  if (s->spent + s->last <= s->budget) return PETSC_TRUE;
+  if (s->n_models < LEAST && !(Stands(s) && s->n - s->n_own >= LEAST)) return PETSC_TRUE;
   /* Twice what was spent, so that a search that takes it goes on. */
   enough = given * 2 * (s->spent - s->own + s->last) / (s->budget - s->own);
   if (given > 0)
@@ -401,7 +417,7 @@ static PetscErrorCode Count(Search *s, HycoAttempt *a)
   if (t->trainer.work && !a->failure[0]) s->last += (*t->trainer.work)(t);
   s->spent += s->last;
   /* Only models that are good for something count as attempts made. */
-  s->n_models += !a->failure[0] && (a->beaten_by || a->held_out.largest[HYCO_ERROR_U] < USELESS);
+  s->n_models += IsUseful(a);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -527,11 +543,12 @@ static PetscBool HasNoEffect(const Search *s, PetscInt first)
 }
 
 /* The number of attempts in a row, up to the last one, without progress. With large errors, and for paths, whose
-   dropped attempts do not show it, only those without an effect count. */
+   dropped attempts do not show it, only those without an effect count, and those of no use if a model stands. */
 static PetscInt CountStale(const Search *s, PetscInt first, PetscReal least, PetscInt stale)
 {
   const PetscBool slow = (PetscBool)(least <= WILD && !s->t->scene->n_times);
 
+  if (s->t->scene->n_times && !IsUseful(&s->attempt[s->n - 1]) && Stands(s)) return stale + 1;
   if (s->attempt[s->n - 1].ratio < PROGRESS * least) return 0;
   return slow || HasNoEffect(s, first) ? stale + 1 : 0;
 }
