@@ -136,6 +136,16 @@ PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank);
 */
 PetscErrorCode HycoBlocksBalance(const HycoBlocks *blocks, PetscInt p, const PetscReal A[], const PetscReal f[],
                                  PetscReal r[], PetscBool *exists);
+/* Whether the law of a block, Coulomb's, has friction: its coefficient is above 0. */
+PetscBool HycoBlockRubs(const HycoBlocks *blocks, PetscInt k);
+/*
+  Coulomb's law: x[p], the change of the p motions after a step with the slacks w and the forces r (by row) along the n
+  motions that no force acts on, by which the contacts slip least in the step and no gap becomes negative; move[p]: the
+  motions' change in the step. first[p]: one of the n. A as above; w changes by -A^T x. Not collective.
+*/
+PetscErrorCode HycoBlocksStay(const HycoBlocks *blocks, PetscInt p, const PetscReal A[], const PetscReal w[],
+                              const PetscReal r[], const PetscReal move[], PetscReal x[], PetscInt *n,
+                              PetscReal first[]);
 /* Semismooth Newton's method for blocks of any cone, z = P(z - rho w), w = q + M z, from z = (x_pinned, forces). */
 PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *its, HycoLCPStatus *status);
 /* Writes a problem with Coulomb's law, its solution z and a start (both p + n) in FCLIB's layout `fclib_local`; dim:

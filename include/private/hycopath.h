@@ -99,7 +99,8 @@ struct _n_HycoPath {
   PetscInt kept;           /* number of contact systems solved with this K */
   PetscBool flows;         /* some body's law is inelastic */
   PetscBool rubs;          /* friction: the contact forces have no potential */
-  char slides[HYCO_LINE];  /* how a body slides away in a larger step, which halving cannot mend; "": none does */
+  char loose[HYCO_LINE]; /* full order: a motion that no contact force acted on where the coefficient was 0; "": none */
+  char slides[HYCO_LINE]; /* how a body slides away in a larger step, which halving cannot mend; "": none does */
   /* Anderson's acceleration: differences of iterates and residuals, newest last */
   PetscInt n_mixed;
   Vec dU[HYCO_ANDERSON], dG[HYCO_ANDERSON], U_last, G_last, G;
@@ -175,6 +176,8 @@ PetscErrorCode HycoFrictionDestroy(HycoFOM fom);
 PetscErrorCode HycoFrictionBegin(HycoFOM fom);
 /* After HycoFOMAssemble(): the path's system with tangents, or the one without if no coefficient is above 0. */
 PetscErrorCode HycoFrictionAssemble(HycoFOM fom);
+/* Once a step is accepted, before its work: its forces; bodies stay along motions that no contact force acts on. */
+PetscErrorCode HycoFrictionTake(HycoFOM fom);
 /* The work of the bodies against the contact forces in the step that was accepted. */
 PetscErrorCode HycoFrictionWork(HycoFOM fom, PetscReal *work);
 /* The accepted step becomes the state of the contacts. */

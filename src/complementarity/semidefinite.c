@@ -11,6 +11,9 @@
 #include <hycolcp.h>
 #include <petscblaslapack.h>
 
+#define FREE 1e-14 /* squared share of a motion that contacts meet: below, it is round-off */
+#define LOAD 1e-10 /* share of the loads on such a motion that is round-off */
+
 typedef struct {
   PetscInt p, m, n; /* numbers of pinned unknowns, contacts, both */
   const PetscReal *M, *q;
@@ -220,10 +223,50 @@ static PetscErrorCode Unload(Floating *h, PetscBool active[], PetscBool *done)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Holds the motions that no contact meets, as where friction alone would hold them, and takes the round-off of the loads
+   from them: M and q then are copies. A motion under a load is left free. */
+static PetscErrorCode HoldFree(HycoLCP *lcp, PetscReal **M, PetscReal **q)
+{
+  const PetscInt p = lcp->p;
+  const size_t n = (size_t)(p + lcp->n);
+  PetscReal *gram, *value, *work, most = 0, size = 0;
+  PetscBLASInt rows, lwork, info;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(p, &rows));
+  lwork = 8 * rows;
+  PetscCall(PetscCalloc3(p * p, &gram, p, &value, 8 * p, &work));
+  for (size_t j = (size_t)p; j < n; j++) {
+    for (PetscInt i = 0; i < p * p; i++) gram[i] += lcp->M[j * n + (size_t)(i / p)] * lcp->M[j * n + (size_t)(i % p)];
+    most = PetscMax(most, PetscAbsReal(lcp->M[j * n + j]));
+  }
+  LAPACKsyev_("V", "U", &rows, gram, &rows, value, work, &lwork, &info);
+  PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev: %d", (int)info);
+  for (PetscInt i = 0; i < p; i++) size += lcp->q[i] * lcp->q[i];
+  for (PetscInt k = 0; k < p && value[k] <= FREE * value[p - 1] && most > 0; k++) {
+    const PetscReal *v = gram + k * p;
+    PetscReal load = 0;
+
+    for (PetscInt i = 0; i < p; i++) load += v[i] * lcp->q[i];
+    if (PetscAbsReal(load) > LOAD * PetscSqrtReal(size)) continue;
+    if (!*M) {
+      HycoDuplicate(n * n, lcp->M, M);
+      HycoDuplicate(n, lcp->q, q);
+      lcp->M = *M;
+      lcp->q = *q;
+    }
+    for (PetscInt i = 0; i < p; i++) {
+      (*q)[i] -= load * v[i];
+      for (PetscInt j = 0; j < p; j++) (*M)[(size_t)i * n + (size_t)j] += v[i] * v[j] / most;
+    }
+  }
+  PetscCall(PetscFree3(gram, value, work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* For lcp->p > 0; z = (x_pinned, L). On one process, or alike on every rank. One by one: sets that change at once may
    leave a body without any contact, and the matrix singular. */
-PetscErrorCode HycoLCPSemidefinite(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
-                                   HycoLCPStatus *status)
+static PetscErrorCode Solve(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its, HycoLCPStatus *status)
 {
   const PetscInt n = lcp->p + lcp->n;
   Floating h = {.p = lcp->p, .m = lcp->n, .n = n, .M = lcp->M, .q = lcp->q, .symmetric = lcp->symmetric, .z = z};
@@ -253,5 +296,18 @@ PetscErrorCode HycoLCPSemidefinite(const HycoLCP *lcp, PetscBool active[], Petsc
   PetscCall(HycoActiveSetRun(&e, active, its, status));
   if (*status != HYCO_LCP_SOLVED && lcp->symmetric) PetscCall(Continue(&e, lcp, active, z, its, status));
   PetscCall(PetscFree3(h.a, h.w, h.idle));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoLCPSemidefinite(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
+                                   HycoLCPStatus *status)
+{
+  HycoLCP held = *lcp;
+  PetscReal *M = NULL, *q = NULL;
+
+  PetscFunctionBegin;
+  PetscCall(HoldFree(&held, &M, &q));
+  PetscCall(Solve(&held, active, z, its, status));
+  HycoFreeAll(&M, &q);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

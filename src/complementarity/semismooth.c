@@ -54,6 +54,8 @@ typedef struct {
   PetscReal start;                /* the largest force at the start */
   HycoConeStep *linear;
   PetscBool slides; /* no forces balance the loads */
+  PetscInt rubs;    /* blocks with friction */
+  PetscBool smooth; /* floating bodies, and a coefficient of friction is 0: J may lack rank along their motions */
   PetscBool soft;   /* the scales are those without motions on soft supports */
   PetscInt its;
 } Newton;
@@ -285,10 +287,13 @@ static PetscErrorCode Improve(Newton *h, PetscReal z[], PetscReal *norm, PetscRe
   PetscFunctionBegin;
   *less = PETSC_FALSE;
   PetscCall(Step(h, z, (PetscBool)(*norm <= NEAR * *size), PETSC_FALSE, regular));
-  if (*regular) PetscCall(Search(h, LEAST_STEP, z, norm, size, less));
+  /* By least squares below: else a body would run away along a motion that no force acts on. */
+  if (*regular && !(h->smooth && h->linear->nearly_singular && h->linear->m <= MOST_LEAST))
+    PetscCall(Search(h, LEAST_STEP, z, norm, size, less));
   /* A new factor where the present one does not contract; the next step begins with it. */
   if (*less && lagged && *norm > CONTRACTS * before) PetscCall(HycoConeStepRenew(h->linear));
-  if (!*less && *norm > SOLVED * *size) { /* by the residual, with a factor of J itself */
+  if (!*less && *norm > SOLVED * *size &&
+      !(h->smooth && h->linear->nearly_singular)) { /* by the residual, with a factor of J itself */
     PetscCall(HycoConeStepRenew(h->linear));
     PetscCall(Step(h, z, PETSC_TRUE, PETSC_FALSE, regular));
     /* Not where forces are not unique: proximal steps find those near the last ones. */
@@ -585,7 +590,9 @@ static PetscErrorCode FromNormal(Newton *h, PetscReal z[], HycoLCPStatus *status
   PetscCall(PetscFree2(row, active));
   if (*status != HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
   if (p) PetscCall(ShortenMotions(h, z));
-  PetscCall(Iterate(h, z, status));
+  /* Without friction it is the solution. */
+  if (p && !h->rubs) PetscCall(Take(h, z, z, status));
+  if (!p || h->rubs || *status != HYCO_LCP_SOLVED) PetscCall(Iterate(h, z, status));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -751,7 +758,10 @@ static PetscErrorCode FromBefore(Newton *h, PetscReal z[], HycoLCPStatus *status
 
   PetscFunctionBegin;
   HycoDuplicate(h->n, z, &given);
-  PetscCall(FromForces(h, z, status));
+  if (h->rubs || !h->p)
+    PetscCall(FromForces(h, z, status));
+  else
+    PetscCall(FromNormal(h, z, status));
   /* Before other starts: no start would find any. */
   if (*status != HYCO_LCP_SOLVED) PetscCall(SlidesAway(h, z));
   if (h->slides) *status = HYCO_LCP_RAY;
@@ -961,6 +971,12 @@ PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *it
   h.linear->symmetric = (PetscBool)(lcp->symmetric && !lcp->p);
   h.rho = f->rho;
   PetscCall(PetscMalloc5(n, &h.w, n, &h.y, n, &h.F, n, &h.step, 3 * n, &h.trial));
+  for (PetscInt k = 0; k < h.blocks->n && h.p; k++) {
+    const PetscBool rubs = HycoBlockRubs(h.blocks, k);
+
+    h.rubs += rubs;
+    h.smooth = (PetscBool)(h.smooth || (!rubs && h.blocks->row[k + 1] - h.blocks->row[k] > 1));
+  }
   PetscCall(ScaleFree(&h, f, z));
   for (PetscInt i = h.p; i < n; i++) h.start = PetscMax(h.start, PetscAbsReal(z[i]));
   PetscCall(Chain(&h, z, status));

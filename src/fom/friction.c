@@ -270,6 +270,92 @@ static PetscErrorCode TakeForces(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether on some rank a contact with a force has no friction, or nothing rubs at all. */
+static PetscBool Smooth(HycoFOM f)
+{
+  const HycoFriction r = f->friction;
+  const PetscScalar *L;
+  PetscBool smooth = (PetscBool)!r->used;
+
+  PetscCallAbort(PETSC_COMM_SELF, VecGetArrayRead(r->L, &L));
+  for (PetscInt k = 0; k < f->pairs.n && !smooth; k++)
+    smooth = (PetscBool)(!(r->slip.mu[k] > 0) && L[r->slip.row[k]] > 0);
+  PetscCallAbort(PETSC_COMM_SELF, VecRestoreArrayRead(r->L, &L));
+  return smooth;
+}
+
+/* The rows of the motions v, gathered, and how far the step has moved along them. */
+static PetscErrorCode GatherMotions(HycoFOM f, PetscInt p, const Vec v[], PetscReal A[], PetscReal move[])
+{
+  HycoFriction r = f->friction;
+  PetscReal *row;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetSize(r->L, &n));
+  PetscCall(PetscMalloc1(n + 1, &row));
+  PetscCall(VecWAXPY(f->path->work, -1, f->path->U_old, f->U));
+  for (PetscInt i = 0; i < p; i++) {
+    PetscCall(MatMult(r->B, v[i], r->work));
+    PetscCall(HycoVecGather(r->work, row));
+    for (PetscInt j = 0; j < n; j++) A[j * p + i] = row[j];
+    PetscCall(VecDot(f->path->work, v[i], &move[i]));
+  }
+  PetscCall(PetscFree(row));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where a body may move freely because a coefficient is 0, it stays: with the least slip. The first such motion under a
+   force is named. */
+static PetscErrorCode Stay(HycoFOM f)
+{
+  HycoFriction r = f->friction;
+  MatNullSpace kernel = NULL;
+  HycoMotions motions;
+  HycoBlocks *blocks;
+  PetscReal *A, *w, *L, *move, *x, *first, most;
+  PetscInt p = 0, n, loose;
+  PetscBool smooth;
+  const Vec *v;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetNullSpace(f->K, &kernel));
+  if (kernel) PetscCall(MatNullSpaceGetVecs(kernel, NULL, &p, &v));
+  if (!p) PetscFunctionReturn(PETSC_SUCCESS);
+  smooth = Smooth(f);
+  HycoAllreduce(&smooth, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
+  if (!smooth) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoBlocksGather(HycoComm(f), r->system->blocks, &blocks));
+  PetscCall(VecGetSize(r->L, &n));
+  PetscCall(PetscMalloc6(p * n, &A, n, &w, n, &L, p, &move, p, &x, p, &first));
+  PetscCall(GatherMotions(f, p, v, A, move));
+  PetscCall(MatMult(r->B, f->U, r->work));
+  PetscCall(VecAYPX(r->work, -1, r->D));
+  PetscCall(HycoVecGather(r->work, w));
+  PetscCall(HycoVecGather(r->L, L));
+  PetscCall(HycoBlocksStay(blocks, p, A, w, L, move, x, &loose, first));
+  if (loose) PetscCall(VecMAXPY(f->U, p, x, (Vec *)v));
+  PetscCall(VecNorm(f->Lambda, NORM_INFINITY, &most));
+  if (loose && most > 0 && !f->path->loose[0]) {
+    /* In the order of the null space, which is made from them. */
+    PetscCall(HycoFEFreeMotions(HycoComm(f), f->fe, &motions));
+    if (motions.n == p) HycoMotionsName(f->fe, &motions, first, f->path->loose);
+    PetscCall(HycoMotionsDestroy(&motions));
+  }
+  PetscCall(PetscFree6(A, w, L, move, x, first));
+  PetscCall(HycoBlocksDestroy(&blocks));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The forces of the accepted step, and where the bodies are whose place it leaves open. Collective. */
+PetscErrorCode HycoFrictionTake(HycoFOM f)
+{
+  PetscFunctionBegin;
+  PetscCall(TakeForces(f));
+  PetscCall(Stay(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* (L0 + L1) / 2 . B (U1 - U0) with tangents, also where one of the two times has none. */
 PetscErrorCode HycoFrictionWork(HycoFOM f, PetscReal *sum)
 {
@@ -278,7 +364,6 @@ PetscErrorCode HycoFrictionWork(HycoFOM f, PetscReal *sum)
   PetscReal both[2];
 
   PetscFunctionBegin;
-  PetscCall(TakeForces(f));
   PetscCall(VecWAXPY(p->work, -1, p->U_old, f->U));
   /* The trapezoidal rule over the step, exact where forces change linearly. */
   PetscCall(MatMult(r->B, p->work, r->work));
@@ -336,7 +421,7 @@ static PetscErrorCode WriteFclib(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After HycoFrictionWork(), which sets L. w = D - B U with the old D: its tangential part is minus the slip of the
+/* After HycoFrictionTake(), which sets L. w = D - B U with the old D: its tangential part is minus the slip of the
    step. Afterwards u_old is the accepted surface. Collective. */
 PetscErrorCode HycoFrictionAccept(HycoFOM f)
 {

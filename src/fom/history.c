@@ -122,7 +122,7 @@ PetscErrorCode HycoPathBegin(HycoPath p, const PetscReal mu[])
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(p->mu, mu, p->scene->n_parameters));
   p->t = p->scene->times[0];
-  p->slides[0] = '\0';
+  p->slides[0] = p->loose[0] = '\0';
   p->step = p->n_steps = p->n_orders = p->n_taken = p->n_cuts = p->n_bound = 0;
   p->rate = p->crept = p->changed = 0;
   /* The first step goes as far as the listed times and the kinks allow. */

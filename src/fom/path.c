@@ -268,7 +268,7 @@ static PetscErrorCode JudgeStep(HycoPath p, HycoReason reason, char why[HYCO_LIN
   PetscCall(VecGetArrayRead(f->U_local, &u));
   PetscCall(HycoFOMJudge(f, u, p->L_new, 0, &reason, &relative, why));
   PetscCall(VecRestoreArrayRead(f->U_local, &u));
-  if (p->rubs && reason == HYCO_DIVERGED_FLOATING) HycoFormat(p->slides, "%s", why);
+  if (f->friction && reason == HYCO_DIVERGED_FLOATING) HycoFormat(p->slides, "%s", why);
   /* Within round-off of the largest load that friction balances: what ends the path is what comes after it. */
   if (reason == HYCO_DIVERGED_HELD && p->slides[0]) HycoFormat(why, "%s", p->slides);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -281,6 +281,7 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
   PetscReal defect = 0;
 
   PetscFunctionBegin;
+  if (((HycoFOM)p->ctx)->friction) PetscCall(HycoFrictionTake((HycoFOM)p->ctx));
   PetscCall(AddWork((HycoFOM)p->ctx, &a->law, &defect));
   PetscCall(VecCopy(p->F, p->F_old));
   PetscCall(VecCopy(p->f_int, p->f_old));

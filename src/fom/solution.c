@@ -202,9 +202,9 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   PetscCall(HycoFOMJudge(f, f->u, f->n_contacts ? f->Lambda : NULL, defect, &s->reason, &s->u_relative, why));
   PetscCall(PetscStrncpy(s->why, why, sizeof(s->why)));
   PetscCall(MeasureContacts(f, s));
-  why[0] = '\0';
+  HycoFormat(why, "%s", f->path ? f->path->loose : "");
   /* Of a path at its end, if nothing presses: friction may hold what normal forces do not. */
-  if (s->reason > 0 && !f->given && (!f->path || !s->n_active)) PetscCall(HycoFOMNameLoose(f, why));
+  if (s->reason > 0 && !f->given && !why[0] && (!f->path || !s->n_active)) PetscCall(HycoFOMNameLoose(f, why));
   PetscCall(PetscStrncpy(s->loose, why, sizeof(s->loose)));
   PetscCall(NameBuried(f, s));
   for (PetscInt k = 0; f->path && k < f->path->n_steps; k++)

@@ -57,6 +57,16 @@ contact: {floor: {group: base, normal: {y: -1}, gap: 0, friction: 0.2}, cover: {
 history: {times: [0, 1, 2, 3], tables: {p: [[0, 0], [1, 1], [2, 1], [3, 0]]}}
 output: {along: {mean: u_x, group: block}, up: {mean: u_y, group: block}}
 """
+RIDER = """
+scene: {mesh: mesh.msh, parameters: [mu]}
+parameter: {mu: {range: [0, 0.5]}}
+body: {block: {young: 1000, poisson: 0.3}, lid: {young: 2000, poisson: 0.3}}
+fixed: {base: {x: "0.2*max(min(t - 1, 1), 0)", y: 0}}
+pressure: {top: "10*min(t, 1)"}
+contact: {cover: {type: surface, slave: back, master: under, friction: mu}}
+history: {times: [0, 1, 2, 3]}
+output: {along: {mean: u_x, group: lid}}
+"""
 RING = """
 scene: {mesh: mesh.msh, formulation: axisymmetric}
 body: {ring: {young: 1000, poisson: 0.3}}
@@ -136,7 +146,8 @@ class Friction(Case):
 
     def test_unloaded(self):
         """The block that friction holds, with its load taken away and applied again: no forces at the time without a load. So a block that a lid
-        has drawn along and leaves: it stays there, and a line says that nothing holds it."""
+        has drawn along and leaves: it stays there, and a line says that nothing holds it. A block
+        pressed on a carrier without friction goes with it, as with some, also in a model, and the line says so; a load on this motion is refused."""
         grid = Grid()
         grid.box('quad4', [np.linspace(0, 2, 9), np.linspace(0, 1, 5)], lambda x: x, 'block', {'y0': 'base', 'y1': 'top'})
         grid.write(self.path('mesh.msh'))
@@ -157,6 +168,19 @@ class Friction(Case):
         self.assertLess(abs(rows[3]['along'] - rows[2]['along']), 0.01)  # where it stays
         self.assertLess(abs(rows[3]['up']), 1e-12)
         self.assertIn('no contact force keeps body block', self.run_raw('solve', '-scene', scene).stdout)
+        scene = self.changed('scene.yaml', RIDER, ())
+        some, none = (self.rows(scene, '-mu', mu) for mu in ('0.4', '0'))
+        for a, b in zip(some, none):
+            self.assertLess(abs(a['along'] - b['along']), 1e-3)
+        self.assertGreater(none[2]['along'], 0.19)
+        self.assertIn('no contact force keeps body lid from moving along (1, 0, 0)', self.run_raw('solve', '-scene', scene, '-mu', '0').stdout)
+        self.hyco('train', '-scene', scene, '-grid', '2', '-model', self.path('m.h5'), '-hyco_model_type', 'bodies', '-hyco_validation', '0')
+        model = self.hyco('predict', '-model', self.path('m.h5'), '-mu', '0')['history']['outputs']['along']
+        for a, b in zip(model, none):
+            self.assertLess(abs(a - b['along']), 1e-9)
+        run = self.run_raw('solve', '-scene', self.changed('scene.yaml', RIDER, (('output:', 'force: {lid: {x: "max(t - 1, 0)"}}\noutput:'),)), '-mu', '0')
+        self.assertEqual(run.returncode, 1)
+        self.assertIn('no support keeps body lid from moving along', run.stderr)
 
     def test_ring(self):
         """A ring in a bore that is too small, pushed along it: the resultant is mu times the radial force, and balances the support's."""

@@ -214,6 +214,39 @@ static PetscErrorCode Measure(HycoBodiesFriction f, HycoBodiesWork o, const Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The rows of the motions, p x rows by columns. */
+static void MotionRows(HycoBodiesFriction f, PetscReal A[])
+{
+  const PetscInt n = f->all.n, p = f->p;
+
+  for (PetscInt k = 0; k < p * n; k++) A[k] = f->M[(size_t)(p + k / p) * (size_t)(p + n) + (size_t)(k % p)];
+}
+
+/* As at full order: bodies stay along motions that no contact force acts on. */
+static PetscErrorCode Stay(HycoBodiesFriction f)
+{
+  const PetscInt n = f->all.n, p = f->p, last = (f->n_taken - 1) * (p + n);
+  PetscReal *A, *w, *move, *x, *first;
+  PetscBool smooth = (PetscBool)!HycoSlipRubs(&f->slip);
+  PetscInt loose;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < f->slip.n && !smooth; k++)
+    smooth = (PetscBool)(!(f->slip.mu[k] > 0) && f->z[p + f->slip.row[k]] > 0);
+  if (!p || !smooth) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc5(p * n, &A, p + n, &w, p, &move, p, &x, p, &first));
+  MotionRows(f, A);
+  PetscCall(PetscArraycpy(w, f->q, p + n));
+  for (PetscInt k = 0; k < p + n; k++) {
+    for (PetscInt i = p; i < p + n; i++) w[i] += f->M[(size_t)k * (size_t)(p + n) + (size_t)i] * f->z[k];
+  }
+  for (PetscInt i = 0; i < p; i++) move[i] = f->z[i] - (f->n_taken ? f->taken[last + i] : 0);
+  PetscCall(HycoBlocksStay(f->blocks, p, A, w + p, f->z + p, move, x, &loose, first));
+  for (PetscInt i = 0; i < p; i++) f->z[i] += x[i];
+  PetscCall(PetscFree5(A, w, move, x, first));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The problem at alpha (NULL: elastic bodies). The first start of a step is the accepted forces of the last one, not
    those of an attempt: a halved step must give what it would have given at once. `again`: at another alpha of the same
    step, from the forces found there. */
@@ -243,6 +276,7 @@ PetscErrorCode HycoBodiesFrictionTouch(HycoBodiesFriction f, HycoBodiesWork o, P
   }
   PetscCall(HycoTaoSolveLCP(f->tao, &lcp, NULL, f->z, its, solved));
   PetscCall(HycoBlocksAdmit(f->blocks, f->z + p)); /* inadmissible by round-off; residuals are recomputed */
+  if (*solved) PetscCall(Stay(f));
   PetscCall(PetscArraycpy(o->x, f->z, p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -303,7 +337,7 @@ PetscErrorCode HycoBodiesFrictionSlides(HycoBodiesFriction f, PetscBool *slides)
   if (!p) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc3(p * n, &A, p, &load, n, &r));
   for (PetscInt i = 0; i < p; i++) load[i] = -f->q[i];
-  for (PetscInt k = 0; k < p * n; k++) A[k] = f->M[(size_t)(p + k / p) * (size_t)(p + n) + (size_t)(k % p)];
+  MotionRows(f, A);
   PetscCall(HycoBlocksBalance(f->blocks, p, A, load, r, &exists));
   *slides = (PetscBool)!exists;
   PetscCall(PetscFree3(A, load, r));

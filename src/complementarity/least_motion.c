@@ -1,0 +1,159 @@
+/*
+  Bodies along whose motions no contact force acts, as where friction alone would hold them and its coefficient is 0: of
+  the solutions, which differ by these motions, the one in which the closed contacts slip least in the step, then the one
+  with the least motion, where no gap becomes negative.
+*/
+#include <hycoconeimpl.h>
+#include <hycolcp.h>
+#include <petscblaslapack.h>
+
+#define FREE 1e-14 /* squared share of a motion that the closed contacts resist: below, they leave it free */
+#define HELD 1e-12 /* of the largest force: smaller ones hold nothing */
+#define LAST 1e-12 /* squared weight of the motion itself, which decides what no slip of a closed contact does */
+#define TINY 1e-12 /* of the largest gap or slip: round-off */
+
+/* Coulomb's law: its first datum is the coefficient. */
+PetscBool HycoBlockRubs(const HycoBlocks *b, PetscInt k)
+{
+  return (PetscBool)(b->row[k + 1] - b->row[k] > 1 && b->data[b->at[k]] > 0);
+}
+
+/* The free motions (p x n by columns) of the rows of blocks with a force, on scaled motions: tangents hold where there is
+   friction. */
+static PetscErrorCode FreeMotions(const HycoBlocks *b, PetscInt p, const PetscReal A[], const PetscReal scale[],
+                                  const PetscBool closed[], PetscInt *n, PetscReal N[])
+{
+  PetscReal *gram, *value, *work;
+  PetscBLASInt size, lwork, info;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(p, &size));
+  lwork = 8 * size;
+  PetscCall(PetscCalloc3(p * p, &gram, p, &value, 8 * p, &work));
+  for (PetscInt k = 0; k < b->n; k++) {
+    for (PetscInt j = b->row[k]; j < b->row[k + 1] && closed[k]; j++) {
+      if (j > b->row[k] && !HycoBlockRubs(b, k)) continue;
+      for (PetscInt i = 0; i < p * p; i++)
+        gram[i] += A[j * p + i / p] * A[j * p + i % p] / (scale[i / p] * scale[i % p]);
+    }
+  }
+  LAPACKsyev_("V", "U", &size, gram, &size, value, work, &lwork, &info);
+  PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev: %d", (int)info);
+  for (*n = 0; *n < p && value[*n] <= FREE; ++*n) {
+    for (PetscInt i = 0; i < p; i++) N[*n * p + i] = gram[*n * p + i] / scale[i];
+  }
+  PetscCall(PetscFree3(gram, value, work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the square of a . c - rhs. */
+static void AddSquare(PetscInt n, PetscReal weight, const PetscReal a[], PetscReal rhs, PetscReal H[], PetscReal g[])
+{
+  for (PetscInt i = 0; i < n; i++) g[i] += weight * a[i] * rhs;
+  for (PetscInt i = 0; i < n * n; i++) H[i] += weight * a[i / n] * a[i % n];
+}
+
+/* The row of A on the motions N. */
+static void OnMotions(PetscInt p, PetscInt n, const PetscReal row[], const PetscReal N[], PetscReal a[])
+{
+  for (PetscInt k = 0; k < n; k++) {
+    a[k] = 0;
+    for (PetscInt i = 0; i < p; i++) a[k] += row[i] * N[k * p + i];
+  }
+}
+
+/* c of least squares, and coordinates E (n x n by columns) in which their sum grows alike in all directions. */
+static PetscErrorCode LeastSlip(PetscInt n, PetscReal H[], const PetscReal g[], PetscReal c[], PetscReal E[])
+{
+  PetscReal *value, *work;
+  PetscBLASInt size, lwork, info;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(n, &size));
+  lwork = 8 * size;
+  PetscCall(PetscMalloc2(n, &value, 8 * n, &work));
+  LAPACKsyev_("V", "U", &size, H, &size, value, work, &lwork, &info);
+  PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev: %d", (int)info);
+  PetscCall(PetscArrayzero(c, n));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscReal y = 0;
+
+    for (PetscInt i = 0; i < n; i++) {
+      E[k * n + i] = H[k * n + i] / PetscSqrtReal(PetscMax(value[k], LAST * LAST));
+      y += E[k * n + i] * g[i];
+    }
+    for (PetscInt i = 0; i < n; i++) c[i] += y * E[k * n + i];
+  }
+  PetscCall(PetscFree2(value, work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Changes c as little as possible such that the gaps of open contacts stay; *exists: as is always so but for round-off. */
+static PetscErrorCode KeepGaps(const HycoBlocks *b, PetscInt p, PetscInt n, const PetscReal A[], const PetscReal w[],
+                               const PetscBool closed[], const PetscReal N[], const PetscReal E[], PetscReal c[],
+                               PetscBool *exists)
+{
+  PetscReal *M, *q, *a, *y, most = 0;
+  PetscInt *row, m = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(n * b->n + 1, &M, b->n + 1, &q));
+  PetscCall(PetscCalloc3(n, &a, n, &y, b->n + 1, &row));
+  for (PetscInt j = 0; j < b->row[b->n]; j++) most = PetscMax(most, PetscAbsReal(w[j]));
+  for (PetscInt k = 0; k < b->n; k++) {
+    row[k] = k;
+    q[k] = closed[k] ? most : w[b->row[k]];
+    OnMotions(p, n, A + (size_t)b->row[k] * (size_t)p, N, a);
+    for (PetscInt i = 0; i < n; i++) {
+      M[i * b->n + k] = 0;
+      for (PetscInt l = 0; l < n && !closed[k]; l++) M[i * b->n + k] -= a[l] * E[i * n + l];
+      if (!closed[k]) q[k] -= a[i] * c[i];
+    }
+    if (PetscAbsReal(q[k]) <= TINY * most) q[k] = 0;
+    m += !closed[k];
+  }
+  *exists = PETSC_TRUE;
+  if (m) PetscCall(HycoLCPUnload(b->n, n, b->n, row, M, q, y, exists));
+  for (PetscInt i = 0; i < n * n; i++) c[i % n] += E[i] * y[i / n];
+  PetscCall(PetscFree2(M, q));
+  PetscCall(PetscFree3(a, y, row));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A: p x rows by columns; w changes by -A^T x. */
+PetscErrorCode HycoBlocksStay(const HycoBlocks *b, PetscInt p, const PetscReal A[], const PetscReal w[],
+                              const PetscReal r[], const PetscReal move[], PetscReal x[], PetscInt *n,
+                              PetscReal first[])
+{
+  PetscReal *scale, *N, *H, *g, *a, *c, *E, most = 0;
+  PetscBool *closed, exists;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc3(p, &scale, p * p, &N, b->n + 1, &closed));
+  for (PetscInt j = 0; j < p * b->row[b->n]; j++) scale[j % p] += PetscSqr(A[j]);
+  for (PetscInt i = 0; i < p; i++) scale[i] = scale[i] > 0 ? PetscSqrtReal(scale[i]) : 1;
+  for (PetscInt k = 0; k < b->n; k++) most = PetscMax(most, r[b->row[k]]);
+  for (PetscInt k = 0; k < b->n; k++) closed[k] = (PetscBool)(most > 0 && r[b->row[k]] > HELD * most);
+  PetscCall(FreeMotions(b, p, A, scale, closed, n, N));
+  PetscCall(PetscArrayzero(x, p));
+  PetscCall(PetscArraycpy(first, N, p));
+  PetscCall(PetscCalloc5(*n * *n + 1, &H, *n + 1, &g, *n + 1, &a, *n + 1, &c, *n * *n + 1, &E));
+  for (PetscInt k = 0; k < b->n && *n; k++) {
+    for (PetscInt j = b->row[k] + 1; j < b->row[k + 1] && closed[k]; j++) {
+      OnMotions(p, *n, A + (size_t)j * (size_t)p, N, a);
+      AddSquare(*n, 1, a, w[j], H, g);
+    }
+  }
+  for (PetscInt i = 0; i < p && *n; i++) {
+    for (PetscInt k = 0; k < *n; k++) a[k] = N[k * p + i] * scale[i];
+    AddSquare(*n, LAST, a, -move[i] * scale[i], H, g);
+  }
+  if (*n) {
+    PetscCall(LeastSlip(*n, H, g, c, E));
+    PetscCall(KeepGaps(b, p, *n, A, w, closed, N, E, c, &exists));
+    for (PetscInt i = 0; i < p * *n && exists; i++) x[i % p] += N[i] * c[i / p];
+  }
+  PetscCall(PetscFree3(scale, N, closed));
+  PetscCall(PetscFree5(H, g, a, c, E));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
