@@ -301,7 +301,8 @@ PetscErrorCode HycoBodiesFrictionMove(HycoBodiesFriction friction, HycoBodiesWor
 PetscErrorCode HycoBodiesFrictionProbe(HycoBodiesFriction friction, HycoBodiesWork work, const PetscReal mu[],
                                        const PetscReal z[], PetscReal w[]);
 /* After a solve that failed: whether no forces with this friction balance the loads on the rigid motions. */
-PetscErrorCode HycoBodiesFrictionSlides(HycoBodiesFriction friction, PetscBool *slides);
+PetscErrorCode HycoBodiesFrictionSlides(HycoBodiesFriction friction, HycoBodiesWork work, char name[HYCO_LINE],
+                                        PetscBool *slides);
 /*
   The derivatives of a path of elastic bodies (bodies_along.c), as the ops `stand`, `rest`, `beside`, `along` and `show`; Destroy before that of the
   friction.

@@ -191,6 +191,8 @@ typedef struct {
   PetscInt *part;          /* by node: the connected part that it is in, numbered over all processes */
 } HycoMotions;
 
+/* row[n]: component c at x of the n rigid motions, which it returns: translations, then turns. */
+PetscInt HycoRigidRow(PetscInt dim, const PetscReal x[3], PetscInt c, PetscReal row[6]);
 /* Component c of a rigid motion at x. */
 PetscReal HycoRigidAt(const HycoRigid *rigid, PetscInt dim, const PetscReal x[3], PetscInt c);
 

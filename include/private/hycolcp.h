@@ -136,6 +136,9 @@ PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank);
 */
 PetscErrorCode HycoBlocksBalance(const HycoBlocks *blocks, PetscInt p, const PetscReal A[], const PetscReal f[],
                                  PetscReal r[], PetscBool *exists);
+/* Where none do: adds normal forces to r, so that f - A r is a motion along which no contact opens: the bodies slide by it. */
+PetscErrorCode HycoBlocksLeaveSlide(const HycoBlocks *blocks, PetscInt p, const PetscReal A[], const PetscReal f[],
+                                    PetscReal r[]);
 /* Whether the law of a block, Coulomb's, has friction: its coefficient is above 0. */
 PetscBool HycoBlockRubs(const HycoBlocks *blocks, PetscInt k);
 /*

@@ -143,7 +143,7 @@ typedef struct {
 
 /* Row of component c of the rigid motions (dim translations, then rotations) at x. x is relative to the part's
    centre and size, so that all entries are of order 1 and a tolerance has no unit. */
-static PetscInt RigidRow(PetscInt dim, const PetscReal x[3], PetscInt c, PetscReal row[6])
+PetscInt HycoRigidRow(PetscInt dim, const PetscReal x[3], PetscInt c, PetscReal row[6])
 {
   const PetscInt n = dim == 1 ? 1 : dim == 2 ? 3 : 6;
 
@@ -167,7 +167,7 @@ PetscReal HycoRigidAt(const HycoRigid *r, PetscInt dim, const PetscReal x[3], Pe
   PetscInt n;
 
   for (PetscInt d = 0; d < 3; d++) at[d] = (x[d] - r->centre[d]) / r->size;
-  n = RigidRow(dim, at, c, row);
+  n = HycoRigidRow(dim, at, c, row);
   for (PetscInt j = 0; j < n; j++) sum += row[j] * r->rigid[j];
   return sum;
 }
@@ -294,7 +294,7 @@ static PetscErrorCode AddMotion(MPI_Comm comm, HycoFE fe, const PetscInt part[],
 
     if (part[i / fe->dim] != which) continue;
     for (PetscInt c = 0; c < 3; c++) x[c] = (fe->X[3 * (i / fe->dim) + c] - p->centre[c]) / p->size;
-    RigidRow(fe->dim, x, i % fe->dim, row);
+    HycoRigidRow(fe->dim, x, i % fe->dim, row);
     /* Fixed unknowns are left out: they are zero within round-off, since the motion satisfies the supports. */
     for (PetscInt j = 0; j < n_rigid && !fe->fixed[i]; j++) u[i] += row[j] * v[j];
   }
@@ -394,7 +394,7 @@ static PetscErrorCode AddSpring(HycoFE fe, PetscInt spring, PetscInt n, const Pe
     PetscReal x[3];
 
     for (PetscInt c = 0; c < 3; c++) x[c] = (fe->X[3 * node[r / fe->dim] + c] - p->centre[c]) / p->size;
-    n_rigid = RigidRow(fe->dim, x, r % fe->dim, row[r]);
+    n_rigid = HycoRigidRow(fe->dim, x, r % fe->dim, row[r]);
     /* The largest diagonal entry: K over it is free of units. */
     most = PetscMax(most, K[r * size + r]);
   }
@@ -426,12 +426,12 @@ static PetscErrorCode MeasureParts(MPI_Comm comm, HycoFE fe, PetscBool springs, 
     /* Ties hold nothing: slave and masters are one part. */
     if (!HycoFESupports(fe, k) || HycoMeshOwned(fe->mesh, i) < 0) continue;
     for (PetscInt c = 0; c < 3; c++) x[c] = (fe->X[3 * i + c] - p->centre[c]) / p->size;
-    n = RigidRow(fe->dim, x, k % fe->dim, row);
+    n = HycoRigidRow(fe->dim, x, k % fe->dim, row);
     oblique = HycoFEOblique(fe, k);
     for (PetscInt d = 0; oblique && d < fe->dim; d++) {
       PetscReal other[6];
 
-      RigidRow(fe->dim, x, d, other);
+      HycoRigidRow(fe->dim, x, d, other);
       for (PetscInt a = 0; a < n; a++) row[a] -= oblique->a[d] * other[a];
     }
     for (PetscInt a = 0; a < n * n; a++) Add(&sum[36 * part[i] + a / n * 6 + a % n], row[a / n] * row[a % n]);

@@ -42,8 +42,8 @@ static PetscErrorCode Fill(HycoSystem y, PetscInt p, const Vec z[], PetscReal M[
 /* Adds normal forces to the forces r that come nearest to the load f, so that the rest f - A r is a motion along which no
    contact opens: the one by which the bodies slide. First of all contacts, then, if that leaves nothing, of those with a
    force; else r stays. */
-static PetscErrorCode LeaveSlide(const HycoBlocks *blocks, PetscInt p, const PetscReal A[], const PetscReal f[],
-                                 PetscReal r[])
+PetscErrorCode HycoBlocksLeaveSlide(const HycoBlocks *blocks, PetscInt p, const PetscReal A[], const PetscReal f[],
+                                    PetscReal r[])
 {
   PetscReal *gram, *inverse, *rest, *x, size = 0, slide = 0;
 
@@ -103,7 +103,7 @@ static PetscErrorCode Slides(HycoSystem y, PetscInt p, const Vec z[], Vec L, Pet
   }
   PetscCall(HycoBlocksBalance(blocks, p, A, f, row, &exists));
   *slides = (PetscBool)!exists;
-  if (*slides) PetscCall(LeaveSlide(blocks, p, A, f, row));
+  if (*slides) PetscCall(HycoBlocksLeaveSlide(blocks, p, A, f, row));
   PetscCall(VecGetOwnershipRange(L, &lo, &hi));
   if (*slides) PetscCall(HycoVecWrite(L, hi - lo, row + lo));
   PetscCall(PetscFree3(A, f, row));

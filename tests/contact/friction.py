@@ -178,6 +178,10 @@ class Friction(Case):
         model = self.hyco('predict', '-model', self.path('m.h5'), '-mu', '0')['history']['outputs']['along']
         for a, b in zip(model, none):
             self.assertLess(abs(a - b['along']), 1e-9)
+        pull = ('[mu]', '[mu, h]'), ('0.5]}', '0.5]}, h: {range: [0, 1]}'), ('[0, 0.5]', '[0.4, 0.5]'), ('contact:', 'traction: {top: {x: "h*max(t - 1, 0)"}}\ncontact:')
+        self.hyco('train', '-scene', self.changed('scene.yaml', RIDER, pull), '-grid', '2,1', '-model', self.path('m.h5'), '-hyco_model_type', 'bodies', '-hyco_validation', '0')
+        run = self.run_raw('predict', '-model', self.path('m.h5'), '-mu', '0.4,9', '-extrapolate')
+        self.assertIn('no support keeps body lid from moving along (1, 0, 0)', run.stderr)
         run = self.run_raw('solve', '-scene', self.changed('scene.yaml', RIDER, (('output:', 'force: {lid: {x: "max(t - 1, 0)"}}\noutput:'),)), '-mu', '0')
         self.assertEqual(run.returncode, 1)
         self.assertIn('no support keeps body lid from moving along', run.stderr)

@@ -10,6 +10,8 @@
   alpha, whose derivative dr / dalpha Newton's method on alpha needs (bodies_newton.c).
 */
 #include "bodies_friction.h"
+#include <hycoalgorithms.h>
+#include <hycolcp.h>
 
 #define SOLVED  1e-8 /* residual of the contacts */
 #define TURNED  0.02 /* change of a piece of the law up to which the derivative of the forces is kept */
@@ -326,7 +328,76 @@ PetscErrorCode HycoBodiesFrictionProbe(HycoBodiesFriction f, HycoBodiesWork o, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoBodiesFrictionSlides(HycoBodiesFriction f, PetscBool *slides)
+/* The rigid motion of body b in the displacements U of its surface; *share: the sum of their squares. */
+static PetscErrorCode FitRigid(HycoBodiesFriction f, HycoBodiesWork o, PetscInt b, const PetscReal U[], HycoRigid *r,
+                               PetscReal *share)
+{
+  const HycoFE fe = f->normal.fe;
+  const PetscInt dim = fe->dim, n_rigid = dim == 2 ? 3 : 6, lo = o->bodies->start[b], hi = o->bodies->start[b + 1];
+  PetscReal gram[36] = {0}, inverse[36], right[6] = {0};
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  *share = 0;
+  *r = (HycoRigid){.part = b, .body = o->bodies->probe->cell_body[o->bodies->cell[b]]};
+  for (PetscInt pass = 0; pass < 3; pass++) {
+    for (PetscInt i = 0; i < fe->n_dof; i++) {
+      const PetscReal *X = fe->X + 3 * (i / dim);
+      const PetscInt c = i % dim;
+      PetscReal x[3], row[6];
+
+      if (o->loc[i] < lo || o->loc[i] >= hi) continue;
+      if (!pass) {
+        r->centre[c] += X[c];
+        n += !c;
+      }
+      for (PetscInt k = 0; k < 3; k++) x[k] = X[k] - r->centre[k];
+      if (pass == 1) r->size = PetscMax(r->size, PetscAbsReal(x[c]));
+      if (pass < 2) continue;
+      for (PetscInt k = 0; k < 3; k++) x[k] /= r->size;
+      HycoRigidRow(dim, x, c, row);
+      for (PetscInt k = 0; k < n_rigid * n_rigid; k++) gram[k] += row[k / n_rigid] * row[k % n_rigid];
+      for (PetscInt k = 0; k < n_rigid; k++) right[k] += row[k] * U[i];
+      *share += U[i] * U[i];
+    }
+    for (PetscInt k = 0; !pass && k < 3 && n; k++) r->centre[k] /= (PetscReal)n;
+  }
+  PetscCall(HycoPseudoInverse(n_rigid, n_rigid, gram, 1e-12, inverse));
+  for (PetscInt k = 0; k < n_rigid * n_rigid; k++) r->rigid[k / n_rigid] += inverse[k] * right[k % n_rigid];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Names the body that moves most with the motions d, as full order does. */
+static PetscErrorCode NameSlide(HycoBodiesFriction f, HycoBodiesWork o, const PetscReal d[], char name[HYCO_LINE])
+{
+  const HycoFE fe = f->normal.fe;
+  PetscReal *U, *rest, *x, share, most = 0, one = 1;
+  HycoRigid rigid = {0}, r;
+  HycoMotions motions = {.n = 1, .rigid = &rigid};
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc3(fe->n_dof, &U, fe->n_dof, &rest, f->p, &x));
+  PetscCall(PetscArraycpy(x, o->x, f->p));
+  PetscCall(PetscArrayzero(o->x, f->p));
+  HycoBodiesGiven(o, &f->all, f->z + f->p);
+  HycoBodiesMove(o, &f->all, rest);
+  PetscCall(PetscArraycpy(o->x, d, f->p));
+  HycoBodiesGiven(o, &f->all, f->z + f->p);
+  HycoBodiesMove(o, &f->all, U);
+  PetscCall(PetscArraycpy(o->x, x, f->p));
+  for (PetscInt i = 0; i < fe->n_dof; i++) U[i] -= rest[i];
+  for (PetscInt b = 0; b < o->bodies->n; b++) {
+    PetscCall(FitRigid(f, o, b, U, &r, &share));
+    if (share > most) rigid = r;
+    most = PetscMax(most, share);
+  }
+  name[0] = '\0';
+  if (most > 0) HycoMotionsName(fe, &motions, &one, name);
+  PetscCall(PetscFree3(U, rest, x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesFrictionSlides(HycoBodiesFriction f, HycoBodiesWork o, char name[HYCO_LINE], PetscBool *slides)
 {
   const PetscInt n = f->all.n, p = f->p;
   PetscReal *A, *load, *r;
@@ -340,6 +411,15 @@ PetscErrorCode HycoBodiesFrictionSlides(HycoBodiesFriction f, PetscBool *slides)
   MotionRows(f, A);
   PetscCall(HycoBlocksBalance(f->blocks, p, A, load, r, &exists));
   *slides = (PetscBool)!exists;
+  if (*slides) {
+    PetscReal size = 0;
+
+    PetscCall(HycoBlocksLeaveSlide(f->blocks, p, A, load, r));
+    for (PetscInt k = 0; k < p * n; k++) load[k % p] -= A[k] * r[k / p];
+    for (PetscInt i = 0; i < p; i++) size = PetscMax(size, PetscAbsReal(load[i]));
+    for (PetscInt i = 0; i < p && size > 0; i++) load[i] /= size;
+    PetscCall(NameSlide(f, o, load, name));
+  }
   PetscCall(PetscFree3(A, load, r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -831,13 +831,17 @@ static PetscErrorCode Touch(HycoROM m, PetscReal t1, const PetscReal alpha[], Pe
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   PetscBool solved, slides = PETSC_FALSE;
   PetscInt its;
+  char name[HYCO_LINE] = "";
 
   PetscFunctionBegin;
   PetscCall(HycoBodiesFrictionTouch(w->friction, &w->bodies, t1, w->n_rows ? alpha : NULL, again, &its, &solved));
   a->active_its += its;
   if (!solved) HycoFormat(a->why, "not converged: no contact forces with this friction balance the load");
-  if (!solved) PetscCall(HycoBodiesFrictionSlides(w->friction, &slides));
-  if (slides) HycoFormat(w->path->slides, "%s; a body that contact alone holds slides away", a->why);
+  if (!solved) PetscCall(HycoBodiesFrictionSlides(w->friction, &w->bodies, name, &slides));
+  if (slides)
+    HycoFormat(w->path->slides, "%s%s%s", a->why,
+               name[0] ? "; no support keeps " : "; a body that contact alone holds slides away", name);
+  if (!solved && w->path->slides[0]) HycoFormat(a->why, "%s", w->path->slides);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
