@@ -271,7 +271,10 @@ class DiscOverStop(Case):
             found = report['estimates'][kind]
             self.assertLess(report['error_' + kind]['max'], 1e-9)
             self.assertEqual(found['bounded'] == 1, found['worst_error_over_estimate'] <= 1)
-            self.assertEqual(found['bounded'] > 0.5, found['median_ratio'] >= 1)
+            if found['median_ratio'] is None:  # without round-off there are no errors
+                self.assertEqual(found['bounded'], 1)
+            elif found['bounded'] == 1:
+                self.assertGreaterEqual(found['median_ratio'], 1)
 
 
 if __name__ == '__main__':
