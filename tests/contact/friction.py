@@ -184,7 +184,7 @@ class Friction(Case):
         self.assertIn('no support keeps body lid from moving along (1, 0, 0)', run.stderr)
         run = self.run_raw('solve', '-scene', self.changed('scene.yaml', RIDER, (('output:', 'force: {lid: {x: "max(t - 1, 0)"}}\noutput:'),)), '-mu', '0')
         self.assertEqual(run.returncode, 1)
-        self.assertIn('no support keeps body lid from moving along', run.stderr)
+        self.assertIn('no support keeps body lid from', run.stderr)
 
     def test_ring(self):
         """A ring in a bore that is too small, pushed along it: the resultant is mu times the radial force, and balances the support's."""
