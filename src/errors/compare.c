@@ -17,7 +17,7 @@ static void Add(Norms *n, PetscReal value, PetscReal reference)
 }
 
 /* What round-off leaves of the stresses of cell e: that of the strains of its displacements, which a rigid motion may make
-   large, times the modulus. */
+   large, times the modulus; of a path the round-off of its steps adds up. */
 static PetscReal Rounding(HycoROM m, PetscInt e, const PetscReal u[], PetscReal least)
 {
   const HycoMesh mesh = m->model->mesh;
@@ -34,7 +34,7 @@ static PetscReal Rounding(HycoROM m, PetscInt e, const PetscReal u[], PetscReal 
   }
   for (PetscInt k = 0; k < m->fe->tangent_size[mesh->cell_body[e]]; k++)
     modulus = PetscMax(modulus, PetscAbsReal(tangent[k]));
-  return size > 0 ? HYCO_NOTHING * modulus * most / size : 0;
+  return size > 0 ? 16 * HYCO_NOTHING * modulus * most / size : 0;
 }
 
 /* U, u: displacements of the RID's nodes; sigma: (cells of the RID) x (components); Lambda, lambda: forces of all
