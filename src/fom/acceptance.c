@@ -109,7 +109,6 @@ static PetscErrorCode HeldBy(HycoFOM f, PetscInt p, const Vec v[], PetscReal gra
    "" if there is none. A Gram matrix of the size of the null space decides. Collective. */
 PetscErrorCode HycoFOMNameLoose(HycoFOM f, char name[HYCO_LINE])
 {
-  MatNullSpace kernel = NULL;
   HycoMotions motions;
   PetscReal *gram, *value, *work, size;
   PetscBLASInt n, lwork, info;
@@ -118,8 +117,7 @@ PetscErrorCode HycoFOMNameLoose(HycoFOM f, char name[HYCO_LINE])
 
   PetscFunctionBegin;
   name[0] = '\0';
-  if (f->n_contacts && f->K) PetscCall(MatGetNullSpace(f->K, &kernel));
-  if (kernel) PetscCall(MatNullSpaceGetVecs(kernel, NULL, &p, &v));
+  if (f->n_contacts && f->K) PetscCall(HycoKernelVectors(f->K, &p, &v));
   if (!p) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscBLASIntCast(p, &n));
   lwork = 8 * n;

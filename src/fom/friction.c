@@ -284,43 +284,20 @@ static PetscBool Smooth(HycoFOM f)
   return smooth;
 }
 
-/* The rows of the motions v, gathered, and how far the step has moved along them. */
-static PetscErrorCode GatherMotions(HycoFOM f, PetscInt p, const Vec v[], PetscReal A[], PetscReal move[])
-{
-  HycoFriction r = f->friction;
-  PetscReal *row;
-  PetscInt n;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetSize(r->L, &n));
-  PetscCall(PetscMalloc1(n + 1, &row));
-  PetscCall(VecWAXPY(f->path->work, -1, f->path->U_old, f->U));
-  for (PetscInt i = 0; i < p; i++) {
-    PetscCall(MatMult(r->B, v[i], r->work));
-    PetscCall(HycoVecGather(r->work, row));
-    for (PetscInt j = 0; j < n; j++) A[j * p + i] = row[j];
-    PetscCall(VecDot(f->path->work, v[i], &move[i]));
-  }
-  PetscCall(PetscFree(row));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Where a body may move freely because a coefficient is 0, it stays: with the least slip. The first such motion under a
    force is named. */
 static PetscErrorCode Stay(HycoFOM f)
 {
   HycoFriction r = f->friction;
-  MatNullSpace kernel = NULL;
   HycoMotions motions;
   HycoBlocks *blocks;
   PetscReal *A, *w, *L, *move, *x, *first, most;
-  PetscInt p = 0, n, loose;
+  PetscInt p, n, loose;
   PetscBool smooth;
   const Vec *v;
 
   PetscFunctionBegin;
-  PetscCall(MatGetNullSpace(f->K, &kernel));
-  if (kernel) PetscCall(MatNullSpaceGetVecs(kernel, NULL, &p, &v));
+  PetscCall(HycoKernelVectors(f->K, &p, &v));
   if (!p) PetscFunctionReturn(PETSC_SUCCESS);
   smooth = Smooth(f);
   HycoAllreduce(&smooth, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
@@ -328,7 +305,10 @@ static PetscErrorCode Stay(HycoFOM f)
   PetscCall(HycoBlocksGather(HycoComm(f), r->system->blocks, &blocks));
   PetscCall(VecGetSize(r->L, &n));
   PetscCall(PetscMalloc6(p * n, &A, n, &w, n, &L, p, &move, p, &x, p, &first));
-  PetscCall(GatherMotions(f, p, v, A, move));
+  PetscCall(HycoMotionRows(r->B, p, v, r->work, A));
+  /* How far the step has moved along them. */
+  PetscCall(VecWAXPY(f->path->work, -1, f->path->U_old, f->U));
+  for (PetscInt i = 0; i < p; i++) PetscCall(VecDot(f->path->work, v[i], &move[i]));
   PetscCall(MatMult(r->B, f->U, r->work));
   PetscCall(VecAYPX(r->work, -1, r->D));
   PetscCall(HycoVecGather(r->work, w));

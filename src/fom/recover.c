@@ -30,15 +30,13 @@ static PetscErrorCode SetUp(HycoFOM f)
    sense of least squares. */
 static PetscErrorCode CloseContacts(HycoFOM f)
 {
-  MatNullSpace kernel = NULL;
   const Vec *z;
   PetscReal *gram, *inverse, *right, *x, size;
   PetscInt p = 0;
   Vec *at, gap;
 
   PetscFunctionBegin;
-  if (f->n_contacts) PetscCall(MatGetNullSpace(f->K, &kernel));
-  if (kernel) PetscCall(MatNullSpaceGetVecs(kernel, NULL, &p, &z));
+  if (f->n_contacts) PetscCall(HycoKernelVectors(f->K, &p, &z));
   if (!p) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicateVecs(f->D, p, &at));
   PetscCall(VecDuplicate(f->D, &gap));

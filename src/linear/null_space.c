@@ -147,16 +147,14 @@ static PetscErrorCode WorkOn(Vec z, Vec F, Vec b, Vec Kx, PetscReal least, Vec w
 /* The largest share of the forces' work on a rigid mode that is unbalanced: no x changes it. Collective. */
 PetscErrorCode HycoKernelWork(Mat K, Vec x, Vec F, Vec b, PetscReal *share)
 {
-  MatNullSpace kernel = NULL;
   PetscReal norm[2] = {0, 0}, one = 0;
   const Vec *z;
-  PetscInt n = 0;
+  PetscInt n;
   Vec work, Kx;
 
   PetscFunctionBegin;
   *share = 0;
-  PetscCall(MatGetNullSpace(K, &kernel));
-  if (kernel) PetscCall(MatNullSpaceGetVecs(kernel, NULL, &n, &z));
+  PetscCall(HycoKernelVectors(K, &n, &z));
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   HycoVecDuplicate(F, &work, &Kx);
   PetscCall(MatGetDiagonal(K, Kx));
@@ -190,6 +188,24 @@ PetscErrorCode HycoMotionAtPins(PetscInt n, const Vec v[], const PetscInt pinned
     PetscCall(VecRestoreArrayRead(v[k], &a));
   }
   HycoAllreduce(V, n * n, MPIU_REAL, MPI_SUM, PetscObjectComm((PetscObject)v[0]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A (p x rows of B, by columns), on every rank: B z. work: of B's rows. */
+PetscErrorCode HycoMotionRows(Mat B, PetscInt p, const Vec z[], Vec work, PetscReal A[])
+{
+  PetscReal *row;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetSize(work, &n));
+  PetscCall(PetscMalloc1(n + 1, &row));
+  for (PetscInt i = 0; i < p; i++) {
+    PetscCall(MatMult(B, z[i], work));
+    PetscCall(HycoVecGather(work, row));
+    for (PetscInt j = 0; j < n; j++) A[j * p + i] = row[j];
+  }
+  PetscCall(PetscFree(row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -18,24 +18,23 @@
 static PetscErrorCode Fill(HycoSystem y, PetscInt p, const Vec z[], PetscReal M[], PetscReal q[])
 {
   const size_t n = (size_t)(p + y->m);
-  PetscReal *row;
+  PetscReal *A;
 
   PetscFunctionBegin;
   PetscCall(HycoSystemWork(y));
-  PetscCall(PetscMalloc1(y->m + 1, &row));
+  PetscCall(PetscMalloc1(p * y->m + 1, &A));
+  PetscCall(HycoMotionRows(y->B, p, z, y->work_L, A));
   for (PetscInt i = 0; i < p; i++) {
     PetscCall(VecDot(y->F, z[i], &q[i]));
     q[i] = -q[i];
-    PetscCall(MatMult(y->B, z[i], y->work_L));
-    PetscCall(HycoVecGather(y->work_L, row));
     for (PetscInt j = 0; j < y->m; j++) {
-      M[(size_t)(p + j) * n + (size_t)i] = row[j];
-      M[(size_t)i * n + (size_t)(p + j)] = -row[j];
+      M[(size_t)(p + j) * n + (size_t)i] = A[j * p + i];
+      M[(size_t)i * n + (size_t)(p + j)] = -A[j * p + i];
     }
   }
   /* Any definite block would do: feasibility does not depend on it. */
   for (size_t j = (size_t)p; j < n; j++) M[j * n + j] = 1;
-  PetscCall(PetscFree(row));
+  PetscCall(PetscFree(A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -95,12 +94,8 @@ static PetscErrorCode Slides(HycoSystem y, PetscInt p, const Vec z[], Vec L, Pet
   PetscCall(HycoSystemWork(y));
   PetscCall(HycoBlocksGather(HycoComm(y), y->blocks, &blocks));
   PetscCall(PetscMalloc3(p * y->m, &A, p, &f, y->m, &row));
-  for (PetscInt i = 0; i < p; i++) {
-    PetscCall(VecDot(y->F, z[i], &f[i]));
-    PetscCall(MatMult(y->B, z[i], y->work_L));
-    PetscCall(HycoVecGather(y->work_L, row));
-    for (PetscInt j = 0; j < y->m; j++) A[j * p + i] = row[j];
-  }
+  PetscCall(HycoMotionRows(y->B, p, z, y->work_L, A));
+  for (PetscInt i = 0; i < p; i++) PetscCall(VecDot(y->F, z[i], &f[i]));
   PetscCall(HycoBlocksBalance(blocks, p, A, f, row, &exists));
   *slides = (PetscBool)!exists;
   if (*slides) PetscCall(HycoBlocksLeaveSlide(blocks, p, A, f, row));
@@ -116,7 +111,6 @@ static PetscErrorCode Slides(HycoSystem y, PetscInt p, const Vec z[], Vec L, Pet
 PetscErrorCode HycoSolverLifts(HycoSolver s, Vec L, PetscBool *lifts)
 {
   HycoSystem y = s->system;
-  MatNullSpace kernel = NULL;
   HycoLCP lcp = {.n = y->m, .symmetric = PETSC_TRUE};
   HycoLCPStatus status;
   PetscInt its = 0, n;
@@ -128,8 +122,7 @@ PetscErrorCode HycoSolverLifts(HycoSolver s, Vec L, PetscBool *lifts)
   /* The proximal point method ends on a ray if the problem is infeasible. */
   *lifts = PETSC_FALSE;
   if (!y->K) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(MatGetNullSpace(y->K, &kernel));
-  if (kernel) PetscCall(MatNullSpaceGetVecs(kernel, NULL, &lcp.p, &motion));
+  PetscCall(HycoKernelVectors(y->K, &lcp.p, &motion));
   if (lcp.p && y->blocks) {
     PetscCall(Slides(y, lcp.p, motion, L, lifts));
     PetscFunctionReturn(PETSC_SUCCESS);
