@@ -117,7 +117,8 @@ PetscErrorCode HycoNNMF(PetscInt m, PetscInt n, const PetscReal S[], PetscInt k,
 
 /* The first k columns chosen by QR with column pivoting of A (m x n column major, overwritten). Not collective. */
 PetscErrorCode HycoPivotColumns(PetscInt m, PetscInt n, PetscReal A[], PetscInt k, PetscInt pivot[]);
-/* Smallest and largest singular value of A (m x n column major, kept). Not collective. */
+/* The min(m, n) singular values s of A (m x n column major, kept), in descending order; their extremes. Not collective. */
+PetscErrorCode HycoSingularValues(PetscInt m, PetscInt n, const PetscReal A[], PetscReal s[]);
 PetscErrorCode HycoExtremeSingularValues(PetscInt m, PetscInt n, const PetscReal A[], PetscReal *smallest,
                                          PetscReal *largest);
 /* The pseudo-inverse P (n x m column major) of A (m x n column major, kept); singular values below tol times the first

@@ -64,25 +64,37 @@ PetscErrorCode HycoPseudoInverse(PetscInt m, PetscInt n, const PetscReal A[], Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of a dense A (m x n, by columns), which is not changed. */
-PetscErrorCode HycoExtremeSingularValues(PetscInt m, PetscInt n, const PetscReal A[], PetscReal *smallest,
-                                         PetscReal *largest)
+/* s: min(m, n), in descending order. */
+PetscErrorCode HycoSingularValues(PetscInt m, PetscInt n, const PetscReal A[], PetscReal s[])
 {
   PetscBLASInt mb, nb, one = 1, lwork, info;
-  PetscReal *copy, *s, *work, none;
+  PetscReal *copy, *work, none;
 
   PetscFunctionBegin;
   PetscCall(PetscBLASIntCast(m, &mb));
   PetscCall(PetscBLASIntCast(n, &nb));
   PetscCall(PetscBLASIntCast(64 * (m + n), &lwork));
-  PetscCall(PetscMalloc3(m * n, &copy, PetscMin(m, n), &s, lwork, &work));
+  PetscCall(PetscMalloc2(m * n, &copy, lwork, &work));
   PetscCall(PetscArraycpy(copy, A, m * n));
   LAPACKgesvd_("N", "N", &mb, &nb, copy, &mb, s, &none, &one, &none, &one, work, &lwork, &info);
   PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "singular values did not converge (LAPACK gesvd: %d)",
              (int)info);
+  PetscCall(PetscFree2(copy, work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoExtremeSingularValues(PetscInt m, PetscInt n, const PetscReal A[], PetscReal *smallest,
+                                         PetscReal *largest)
+{
+  const PetscInt k = PetscMin(m, n);
+  PetscReal *s;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(k, &s));
+  PetscCall(HycoSingularValues(m, n, A, s));
   *largest = s[0];
-  *smallest = s[PetscMin(m, n) - 1];
-  PetscCall(PetscFree3(copy, s, work));
+  *smallest = s[k - 1];
+  PetscCall(PetscFree(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -57,7 +57,7 @@ static PetscErrorCode Evaluate(HycoPath p, PetscReal t0, PetscReal t1, PetscBool
   PetscCall(VecNorm(p->r, NORM_2, &now->residual[2]));
   PetscCall(VecPointwiseMult(p->work, p->diagonal, p->U));
   PetscCall(VecNorm(p->work, NORM_2, &now->floor));
-  now->floor *= 16 * PETSC_MACHINE_EPSILON;
+  now->floor *= HYCO_NOTHING;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -105,7 +105,7 @@ static PetscErrorCode Rounding(HycoPath p, PetscReal *least)
   PetscCall(VecNorm(p->rhs, NORM_INFINITY, &size[0]));
   PetscCall(VecPointwiseMult(p->work, p->diagonal, p->U));
   PetscCall(VecNorm(p->work, NORM_INFINITY, &size[1]));
-  *least = PetscMax(NOTHING * size[0], 16 * PETSC_MACHINE_EPSILON * size[1]);
+  *least = PetscMax(NOTHING * size[0], HYCO_NOTHING * size[1]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -220,7 +220,7 @@ static PetscErrorCode RoundingWork(HycoFOM f, PetscReal *work)
   PetscCall(VecRestoreArrayRead(f->path->diagonal, &K));
   PetscCall(VecRestoreArrayRead(f->U, &u));
   PetscCallMPI(MPI_Allreduce(&sum, work, 1, MPIU_REAL, MPI_SUM, HycoComm(f)));
-  *work *= 16 * PETSC_MACHINE_EPSILON;
+  *work *= HYCO_NOTHING;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -255,7 +255,7 @@ static PetscErrorCode Balance(HycoFOM f, PetscInt n, Sums *s, PetscReal *balance
   PetscCall(VecNorm(terms, NORM_1, &size));
   PetscCall(VecDestroy(&terms));
   /* Without any force all of them are round-off of the displacements. */
-  *balance = sum[6 * n] > 16 * PETSC_MACHINE_EPSILON * size ? most / sum[6 * n] : 0;
+  *balance = sum[6 * n] > HYCO_NOTHING * size ? most / sum[6 * n] : 0;
   PetscCall(PetscFree(sum));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

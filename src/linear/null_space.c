@@ -139,7 +139,7 @@ static PetscErrorCode WorkOn(Vec z, Vec F, Vec b, Vec Kx, PetscReal least, Vec w
   PetscCall(VecNorm(z, NORM_2, &norm));
   size = PetscMax(all[0] + all[1], least * norm);
   /* Of at most 1 per cent: beyond it an unbalanced load would be hidden. */
-  rounding = PetscMin(16 * PETSC_MACHINE_EPSILON * rounding, 1e-2 * size);
+  rounding = PetscMin(HYCO_NOTHING * rounding, 1e-2 * size);
   *share = size > 0 ? PetscMax(PetscAbsReal(on[0] - on[1]) - rounding, 0) / size : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -3,6 +3,7 @@
   r_k = (output_k - target_k) / scale_k, by a TAO type on the model's gradients. There may be several minima: it starts at
   the best of some points over the ranges.
 */
+#include <hycoalgorithms.h>
 #include <hycoromimpl.h>
 #include <hycosamples.h>
 #include <petsctao.h>
@@ -383,13 +384,15 @@ static PetscErrorCode SetRanges(Fit *f, const PetscReal held[], PetscInt *n_free
 }
 
 /* How many parameters the answer determines: those that the misfit presses against an end of their range, and of the others
-   the rank of J, whose columns of held parameters are 0. By Gram-Schmidt with the largest rest first. */
-static PetscInt Determined(const Fit *f)
+   the rank of J, whose columns of held parameters are 0. */
+static PetscErrorCode Determined(const Fit *f, PetscInt *n)
 {
-  PetscReal A[HYCO_MAX_QUANTITIES * HYCO_MAX_PARAMETERS], first = 0;
-  PetscInt rank = 0, pressed = 0;
+  const PetscInt most = PetscMin(f->n, f->n_par);
+  PetscReal A[HYCO_MAX_QUANTITIES * HYCO_MAX_PARAMETERS], s[HYCO_MAX_PARAMETERS];
 
-  for (PetscInt i = 0; i < f->n * f->n_par; i++) A[i] = f->J[i];
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(A, f->J, f->n * f->n_par));
+  *n = 0;
   for (PetscInt p = 0; p < f->n_par; p++) {
     PetscReal slope = 0, size = 0;
 
@@ -400,32 +403,12 @@ static PetscInt Determined(const Fit *f)
     /* Where the targets are met the slope is round-off, and the end is no reason. */
     if (!(PetscAbsReal(slope) > LEFT * size) || Size(f->n, f->r) < LEFT || !(slope > 0 ? f->x[p] <= 0 : f->x[p] >= 1))
       continue;
-    pressed++;
+    ++*n;
     for (PetscInt k = 0; k < f->n; k++) A[k * f->n_par + p] = 0;
   }
-  for (; rank < PetscMin(f->n, f->n_par); rank++) {
-    PetscReal most = 0, q[HYCO_MAX_QUANTITIES];
-    PetscInt pivot = 0;
-
-    for (PetscInt p = 0; p < f->n_par; p++) {
-      PetscReal sum = 0;
-
-      for (PetscInt k = 0; k < f->n; k++) sum += PetscSqr(A[k * f->n_par + p]);
-      if (sum <= most) continue;
-      most = sum;
-      pivot = p;
-    }
-    if (!rank) first = most;
-    if (most <= LEFT * LEFT * first) break;
-    for (PetscInt k = 0; k < f->n; k++) q[k] = A[k * f->n_par + pivot] / PetscSqrtReal(most);
-    for (PetscInt p = 0; p < f->n_par; p++) {
-      PetscReal dot = 0;
-
-      for (PetscInt k = 0; k < f->n; k++) dot += q[k] * A[k * f->n_par + p];
-      for (PetscInt k = 0; k < f->n; k++) A[k * f->n_par + p] -= dot * q[k];
-    }
-  }
-  return rank + pressed;
+  PetscCall(HycoSingularValues(f->n_par, f->n, A, s)); /* of its transpose: by columns */
+  for (PetscInt k = 0; k < most && s[k] > LEFT * s[0]; k++) ++*n;
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The fit works on x in [0, 1]^n; mu is made from it at the end. Which starts are tried depends on the fixed sequence of samples, hence the same answer in every run. */
@@ -463,7 +446,7 @@ PetscErrorCode HycoROMFit(HycoROM m, PetscInt n, const PetscInt output[], const 
   PetscCall(Evaluate(&f, x));
   ToParameters(&f, x, mu);
   fit->kink = f.kink;
-  fit->n_determined = Determined(&f);
+  PetscCall(Determined(&f, &fit->n_determined));
   fit->evaluations = f.evaluations;
   PetscCall(PetscArraycpy(fit->scale, f.scale, n));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -295,8 +295,7 @@ static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, Vec diagonal, Pet
   for (PetscInt i = 0; i < n; i++) {
     squares[1] += PetscSqr(K[i] * X[i]);
     /* Negated, so that a NaN stays in the residual. */
-    if (!(PetscAbsReal(residual[i]) <= 16 * PETSC_MACHINE_EPSILON * (PetscAbsReal(K[i] * X[i]) + PetscAbsReal(F[i]))))
-      continue;
+    if (!(PetscAbsReal(residual[i]) <= HYCO_NOTHING * (PetscAbsReal(K[i] * X[i]) + PetscAbsReal(F[i])))) continue;
     squares[0] += residual[i] * residual[i];
     residual[i] = 0;
   }

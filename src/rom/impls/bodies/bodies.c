@@ -60,7 +60,7 @@ static PetscReal Left(HycoROM m, PetscInt k, PetscReal gaps)
     terms += PetscAbsReal(o->row[j]) * (PetscAbsReal(o->free[at]) + PetscAbsReal(o->u[at] - o->free[at]));
   }
   /* Shrinks the residual towards 0 and never past it: a true penetration keeps its sign. */
-  rounding = PetscMin(16 * PETSC_MACHINE_EPSILON * terms, ROUNDED * gaps);
+  rounding = PetscMin(HYCO_NOTHING * terms, ROUNDED * gaps);
   return left > 0 ? PetscMax(left - rounding, 0) : PetscMin(left + rounding, 0);
 }
 

@@ -185,7 +185,7 @@ PetscErrorCode HycoBodiesFrictionPrepare(HycoBodiesFriction f, HycoBodiesWork o,
 static PetscErrorCode Measure(HycoBodiesFriction f, HycoBodiesWork o, const PetscReal L[], HycoKKT *kkt)
 {
   /* Below it gaps are round-off of the coordinates. */
-  PetscReal size = 16 * PETSC_MACHINE_EPSILON / SOLVED * HycoMeshLength(f->normal.fe->mesh), force = 0;
+  PetscReal size = HYCO_NOTHING / SOLVED * HycoMeshLength(f->normal.fe->mesh), force = 0;
   HycoNaturalMap map;
 
   PetscFunctionBegin;

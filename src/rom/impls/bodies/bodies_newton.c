@@ -590,7 +590,7 @@ static PetscErrorCode Evaluate(HycoROM m, PetscReal t0, PetscReal t1, const Pets
   w->norm = PetscSqrtReal(PetscMax(sum[0], sum[1]));
   /* s is a difference of elastic and true stresses: where a point is nearly elastic, its round-off is that of the
      terms. */
-  w->floor = 16 * PETSC_MACHINE_EPSILON * PetscSqrtReal(terms);
+  w->floor = HYCO_NOTHING * PetscSqrtReal(terms);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -45,7 +45,7 @@ PetscErrorCode HycoMultilevelStart(Mat K, Vec f, Vec bound, Vec set, PetscBool *
    is the largest force, `size` the largest gap or displacement, `diagonal` the unknown's own stiffness. */
 static inline PetscBool HycoPulls(PetscReal force, PetscReal largest, PetscReal diagonal, PetscReal bound)
 {
-  return (PetscBool)(force < -1e-12 * largest - 16 * PETSC_MACHINE_EPSILON * diagonal * PetscAbsReal(bound));
+  return (PetscBool)(force < -1e-12 * largest - HYCO_NOTHING * diagonal * PetscAbsReal(bound));
 }
 static inline PetscBool HycoPenetrates(PetscReal value, PetscReal bound, PetscReal size)
 {
