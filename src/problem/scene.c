@@ -698,7 +698,7 @@ static PetscErrorCode ReadFormulation(HycoScene s)
 }
 
 /* From the scene's units; "": not known, as of areas, whose dimension is that of the mesh. Products stand side by side,
-   "N mm". */
+   "N mm", "(N/mm) mm". */
 void HycoQuantityUnit(HycoScene s, const HycoQuantity *q, char unit[HYCO_LINE])
 {
   const char *length = s->unit[HYCO_UNIT_LENGTH], *force = s->unit[HYCO_UNIT_FORCE],
@@ -708,7 +708,7 @@ void HycoQuantityUnit(HycoScene s, const HycoQuantity *q, char unit[HYCO_LINE])
   if (q->kind == HYCO_QUANTITY_AREA || ((work || q->kind == HYCO_QUANTITY_MOMENT) && (!force[0] || !length[0])))
     unit[0] = '\0';
   else if (work || q->kind == HYCO_QUANTITY_MOMENT)
-    HycoFormat(unit, "%s %s", force, length);
+    HycoFormat(unit, "%s%s%s %s", strchr(force, '/') ? "(" : "", force, strchr(force, '/') ? ")" : "", length);
   else if (q->kind >= HYCO_QUANTITY_PRESSURE)
     HycoFormat(unit, "%s", stress);
   else if (q->kind >= HYCO_QUANTITY_REACTION)

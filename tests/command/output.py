@@ -132,6 +132,8 @@ class Output(Case):
         self.assertEqual(next(report['output_units'] for _, report in self.reports if 'pull' in report.get('outputs', ())), units)
         run = self.run_raw('solve', '-scene', self.path('pad.yaml'), '-mu', '0.3')
         self.assertRegex(run.stdout, ', '.join(f'{name} [^ ]+{" " * bool(unit)}{unit}' for name, unit in sorted(units.items())) + '\n')
+        run = self.run_raw('solve', '-scene', self.path('pad.yaml'), '-mu', '0.3', '-scene_unit_force', 'N/mm')
+        self.assertRegex(run.stdout, r'turn [^ ]+ \(N/mm\) mm')
 
     def test_tables(self):
         """Columns of tables, as .csv and as datasets of one dimension, are in the list."""
