@@ -26,6 +26,17 @@ typedef struct {
 */
 PetscErrorCode HycoGetLayout(const char type[], size_t *size, PetscInt *n, const HycoMember *fields[]);
 
+/*
+  For a program whose environment is not hyco's to set; the command does both. If OpenBLAS does not know this processor because it is
+  newer, and has selected its oldest kernels: selects those that the processor supports, unless OPENBLAS_CORETYPE is set. No thread may be in BLAS. False:
+  it cannot in a running process; OPENBLAS_CORETYPE is set for the next one. Not collective.
+*/
+PetscBool HycoBLASChooseKernels(void);
+/* Sets the number of OpenBLAS's or MKL's threads, and returns the number before. 0, and nothing is set: n is 0, another BLAS, or a variable such as
+   OPENBLAS_NUM_THREADS or OMP_NUM_THREADS chooses it. hyco is made for one thread per rank: set 1 before a call, and the former number after it.
+   Not collective. */
+int HycoBLASSetThreads(int n);
+
 #if defined(__cplusplus)
 }
 #endif

@@ -67,6 +67,7 @@ def begin():
         return
     alone = {} if any(name in os.environ for name in LAUNCHED) else {k: v for k, v in ALONE.items() if k not in os.environ}
     os.environ.update(alone)
+    lib.HycoBLASChooseKernels()
     begin.words = (ctypes.c_char_p * 3)(b'hyco', b'-no_signal_handler', None)  # Python keeps its own handlers
     begin.count, begin.list = ctypes.c_int(2), ctypes.cast(begin.words, ctypes.POINTER(ctypes.c_char_p))
     failed = lib.HycoInitialize(ctypes.byref(begin.count), ctypes.byref(begin.list))
@@ -107,7 +108,9 @@ def call(name, *arguments):
     """Calls a function of the library; its error becomes an exception."""
     with lock:  # PETSc knows nothing of threads; a callback may call again
         lib.HycoKeepErrors(1)
+        threads = lib.HycoBLASSetThreads(1)  # of the program's BLAS, which NumPy may share
         failed = getattr(lib, name)(*arguments)
+        lib.HycoBLASSetThreads(threads)
         line = bytes(lib.HycoKeptError()) if failed else b''
         lib.HycoKeepErrors(0)
     if failed:

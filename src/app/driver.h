@@ -104,13 +104,9 @@ PetscBool DriverHasStack(char **argv);
 /* Fails if a launcher of another MPI has started several processes, each of which would do all the work and write
    the same files. Collective. */
 PetscErrorCode DriverCheckLaunch(void);
-/* If OpenBLAS does not know this processor because it is newer, and selects its oldest kernels: selects those that the
-   processor supports (a factor takes half the time), unless OPENBLAS_CORETYPE is set. The library reads that variable
-   when it is loaded, before main(); if it cannot read it again, the program is started again, unless argv is NULL. */
+/* HycoBLASChooseKernels() (a factor takes half the time); where it cannot, the program is started again, unless argv is
+   NULL. */
 void DriverChooseKernels(char **argv);
-/* One BLAS thread per rank, unless its variables, or OpenMP's, are set. (A BLAS reads them when it is loaded, before
-   main().) */
-void DriverOneThread(void);
 
 /* -- option_files.c -- */
 

@@ -1,6 +1,5 @@
 /* How the ranks were started, and the resources that each may use. */
 #include "driver.h"
-#include <dlfcn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -137,62 +136,9 @@ PetscErrorCode DriverCheckLaunch(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The newest OpenBLAS kernels that this processor supports; NULL: none newer than Prescott's. */
-static const char *KernelsOfProcessor(void)
-{
-#if defined(__x86_64__)
-  __builtin_cpu_init();
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&
-      __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512cd"))
-    return "SkylakeX";
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return "Haswell";
-#endif
-  return NULL;
-}
-
-/* OpenBLAS takes its oldest kernels on processors that it does not know. */
+/* The library reads its variable when it is loaded; a new start takes 0.05 s. */
 void DriverChooseKernels(char **argv)
 {
-  static const char choice[] = "OPENBLAS_CORETYPE";
-  union {
-    void *address;
-    const char *(*name)(void);
-    void (*act)(void);
-  } call, forget, choose;
-  const char *kernels = KernelsOfProcessor();
-
-  call.address = dlsym(RTLD_DEFAULT, "openblas_get_corename");
-  /* Only if OpenBLAS has fallen back to its oldest kernels, and the user has chosen none. */
-  if (!kernels || !call.address || getenv(choice) || strcmp(call.name(), "Prescott") || setenv(choice, kernels, 1))
-    return;
-  forget.address = dlsym(RTLD_DEFAULT, "gotoblas_dynamic_quit");
-  choose.address = dlsym(RTLD_DEFAULT, "gotoblas_dynamic_init");
-  if (forget.address && choose.address) { /* what the library does when it is loaded; a new start takes 0.05 s */
-    forget.act();
-    choose.act();
-    if (!strcmp(call.name(), kernels)) return;
-  }
-  if (argv) execv("/proc/self/exe", argv); /* returns only after a failure: hyco then continues unchanged */
-}
-
-/* One thread for each rank unless the user asks for more: threads of all ranks together would exceed the cores. By
-   dlsym(), as any BLAS may be linked. */
-void DriverOneThread(void)
-{
-  static const char *const asked[] = {"OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "MKL_NUM_THREADS",
-                                      "BLIS_NUM_THREADS",     "OMP_NUM_THREADS",  NULL};
-  static const char *const setters[] = {"openblas_set_num_threads", "MKL_Set_Num_Threads", NULL};
-  union {
-    void *address;
-    void (*set)(int);
-  } call;
-
-  for (int k = 0; asked[k]; k++) {
-    /* Any of these is the user's choice, whichever library is linked. */
-    if (getenv(asked[k])) return;
-  }
-  for (int k = 0; setters[k]; k++) {
-    call.address = dlsym(RTLD_DEFAULT, setters[k]);
-    if (call.address) call.set(1);
-  }
+  if (!HycoBLASChooseKernels() && argv)
+    execv("/proc/self/exe", argv); /* returns only after a failure: hyco then continues unchanged */
 }

@@ -231,7 +231,7 @@ int main(int argc, char **argv)
   status = AnswerAtOnce(argc, argv);
   if (status >= 0) return status;
   if (Factors(FindCommand(argv[1]))) DriverChooseKernels(argv);
-  DriverOneThread();
+  (void)HycoBLASSetThreads(1); /* threads of all ranks together would exceed the cores */
   DriverNoteLaunch();
   DriverStartAlone();
   if (Start(&argc, &argv)) return 1;

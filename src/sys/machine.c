@@ -1,9 +1,12 @@
-/* Checks of the environment: a locale with a decimal point, memory of the machine and for BLAS. */
-#define _DEFAULT_SOURCE /* MAP_ANONYMOUS */
+/* The environment: a locale with a decimal point, memory of the machine, kernels, threads and memory of BLAS. */
+#define _GNU_SOURCE /* MAP_ANONYMOUS, RTLD_DEFAULT */
+#include <hycobindings.h>
 #include <hycoimpl.h>
+#include <dlfcn.h>
 #include <locale.h>
 #include <petscblaslapack.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -40,6 +43,74 @@ PetscReal HycoMachineMemory(void)
   const long pages = sysconf(_SC_PHYS_PAGES), size = sysconf(_SC_PAGESIZE);
 
   return pages > 0 && size > 0 ? (PetscReal)pages * (PetscReal)size : 0;
+}
+
+/* The newest OpenBLAS kernels that this processor supports; NULL: none newer than Prescott's. */
+static const char *KernelsOfProcessor(void)
+{
+#if defined(__x86_64__)
+  __builtin_cpu_init();
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&
+      __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512cd"))
+    return "SkylakeX";
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return "Haswell";
+#endif
+  return NULL;
+}
+
+/* OpenBLAS takes its oldest kernels on processors that it does not know. The variable stays for a new start where the
+   kernels in use do not change. */
+PetscBool HycoBLASChooseKernels(void)
+{
+  static const char choice[] = "OPENBLAS_CORETYPE";
+  union {
+    void *address;
+    const char *(*name)(void);
+    void (*act)(void);
+  } call, forget, choose;
+  const char *kernels = KernelsOfProcessor();
+
+  call.address = dlsym(RTLD_DEFAULT, "openblas_get_corename");
+  /* Only if OpenBLAS has fallen back to its oldest kernels, and the user has chosen none. */
+  if (!kernels || !call.address || getenv(choice) || strcmp(call.name(), "Prescott") || setenv(choice, kernels, 1))
+    return PETSC_TRUE;
+  forget.address = dlsym(RTLD_DEFAULT, "gotoblas_dynamic_quit");
+  choose.address = dlsym(RTLD_DEFAULT, "gotoblas_dynamic_init");
+  if (!forget.address || !choose.address) return PETSC_FALSE;
+  /* what the library does when it is loaded */
+  forget.act();
+  choose.act();
+  return (PetscBool)(strcmp(call.name(), kernels) == 0);
+}
+
+/* By dlsym(), as any BLAS may be linked. */
+int HycoBLASSetThreads(int n)
+{
+  static const char *const asked[] = {"OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "MKL_NUM_THREADS",
+                                      "BLIS_NUM_THREADS",     "OMP_NUM_THREADS",  NULL};
+  static const char *const names[][2] = {{"openblas_set_num_threads", "openblas_get_num_threads"},
+                                         {"MKL_Set_Num_Threads", "MKL_Get_Max_Threads"}};
+  union {
+    void *address;
+    void (*set)(int);
+    int (*get)(void);
+  } set, get;
+
+  for (int k = 0; asked[k]; k++) {
+    /* Any of these is the user's choice, whichever library is linked. */
+    if (getenv(asked[k])) return 0;
+  }
+  for (int k = 0; k < 2 && n > 0; k++) {
+    set.address = dlsym(RTLD_DEFAULT, names[k][0]);
+    get.address = dlsym(RTLD_DEFAULT, names[k][1]);
+    if (set.address && get.address) {
+      const int before = get.get();
+
+      if (before != n) set.set(n);
+      return before;
+    }
+  }
+  return 0;
 }
 
 /* The factorisation makes BLAS allocate its buffers now, where a lack of memory can be reported. OpenBLAS ends the

@@ -318,6 +318,50 @@ print(model.predict([0.07, 0.17]).total_contact_force)
             self.assertFalse(os.path.exists('stopped.h5'))
             self.assertTrue(scene.solve([4.06, 0.5]).converged)
 
+    def test_threads(self):
+        """BLAS, which NumPy may share, has one thread in a call and its own number after it; a variable that chooses the number counts."""
+        program = self.path('threads.py')
+        with open(program, 'w', encoding='ascii') as file:
+            file.write("""import sys
+import hyco
+from hyco._library import lib
+lib.openblas_set_num_threads(2)
+if lib.openblas_get_num_threads() != 2:
+    raise SystemExit('without threads')
+seen = set()
+with hyco.Scene('block.yaml') as scene:
+    scene.train(sys.argv[1], grid=[2, 2], progress=lambda done, n: seen.add(lib.openblas_get_num_threads())).close()
+print(seen, lib.openblas_get_num_threads())
+""")
+        chosen = {name: value for name, value in os.environ.items() if 'NUM_THREADS' not in name}
+        for k, (more, want) in enumerate((({}, '{1} 2'), ({'OMP_NUM_THREADS': '2'}, '{2} 2'))):
+            run = subprocess.run([sys.executable, program, f'threads{k}.h5'], cwd=self.folder, capture_output=True, text=True, timeout=100 * PATIENCE, check=False,
+                                 env={**chosen, **more, 'PYTHONPATH': PACKAGE})
+            if 'AttributeError' in run.stderr or 'without threads' in run.stderr:
+                self.skipTest('the BLAS here is not OpenBLAS with threads')
+            self.assertEqual((run.returncode, run.stdout.strip()), (0, want), run.stderr)
+
+    def test_kernels(self):
+        """An OpenBLAS older than the processor uses its oldest kernels, until hyco selects newer ones; those that the environment names stay."""
+        program = """import ctypes
+from hyco._library import begin, lib
+lib.openblas_get_corename.restype = ctypes.c_char_p
+print(lib.openblas_get_corename().decode())
+begin()
+print(lib.openblas_get_corename().decode())"""
+        names = {}
+        for chosen in ('', 'Prescott'):
+            env = {name: value for name, value in os.environ.items() if name != 'OPENBLAS_CORETYPE'}
+            run = subprocess.run([sys.executable, '-c', program], cwd=self.folder, capture_output=True, text=True, timeout=100 * PATIENCE, check=False,
+                                 env={**env, **({'OPENBLAS_CORETYPE': chosen} if chosen else {}), 'PYTHONPATH': PACKAGE})
+            if 'AttributeError' in run.stderr:
+                self.skipTest('the BLAS here is not OpenBLAS')
+            names[chosen] = run.stdout.split()
+        with open('/proc/cpuinfo', encoding='utf-8') as file:
+            new = 'avx2' in file.read()
+        self.assertEqual(names['Prescott'], ['Prescott'] * 2)
+        self.assertEqual(names[''][0] == 'Prescott' and new, names[''][0] != names[''][1], names)
+
     def ranks(self, n, *more, model):
         program = self.path('ranks.py')
         with open(program, 'w', encoding='ascii') as file:
