@@ -9,16 +9,19 @@
 #include <petsctao.h>
 #include <string.h>
 
-#define EXACT   1e-9 /* a misfit below it is round-off */
-#define MINIMUM 1e-5 /* of the slope of the misfit, relative to what the derivatives allow */
-#define WEIGHT  1e-6 /* of the regularisation of Gauss-Newton steps: for targets that do not determine all parameters */
-#define SAME    1e-4 /* relative difference of misfits that are one minimum's */
-#define INSIDE  1e-4 /* share of half the ranges */
-#define LEFT    1e-6 /* share of a parameter's derivatives that is left beside the others' and is not round-off */
+#define EXACT      1e-9 /* a misfit below it is round-off */
+#define MINIMUM    1e-5 /* of the slope of the misfit, relative to what the derivatives allow */
+#define WEIGHT     1e-6 /* of the regularisation of Gauss-Newton steps: for targets that do not determine all parameters */
+#define SAME       1e-4 /* relative difference of misfits that are one minimum's */
+#define STALLED    10   /* iterations in which a misfit that does not fall by SAME ends */
+#define ITERATIONS 200
+#define INSIDE     1e-4 /* share of half the ranges */
+#define LEFT       1e-6 /* share of a parameter's derivatives that is left beside the others' and is not round-off */
 
 typedef struct {
   HycoROM model;
   PetscInt n, n_par;
+  PetscReal earlier;      /* the misfit some iterations before */
   const PetscInt *output; /* by target: its output */
   const PetscReal *target;
   PetscReal scale[HYCO_MAX_QUANTITIES];
@@ -248,11 +251,48 @@ static PetscErrorCode Start(Fit *f, const PetscReal start[], PetscInt n_samples,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether the last point is a minimum within the ranges, by the recomputed slope: a solver's flag is no evidence. */
+static PetscBool IsMinimum(const Fit *f, PetscReal tolerance)
+{
+  PetscReal g[HYCO_MAX_PARAMETERS], most = 0;
+
+  Slope(f, g);
+  for (PetscInt p = 0; p < f->n_par; p++) {
+    /* At an end of a range the slope may point outwards. */
+    const PetscBool held = (PetscBool)((f->x[p] <= 0 && g[p] > 0) || (f->x[p] >= 1 && g[p] < 0));
+
+    if (!held) most = PetscMax(most, PetscAbsReal(g[p]));
+  }
+  /* Relative to the sizes of J and r: the same answer whatever the units of the outputs. */
+  return (PetscBool)(Size(f->n, f->r) <= EXACT || most <= tolerance * Size(f->n * f->n_par, f->J) * Size(f->n, f->r));
+}
+
+/* TAO's callback after an iteration. TAO's own test of the slope has no scale: near a minimum the slope is that of round-off, or of
+   differences. */
+static PetscErrorCode Ends(Tao tao, void *ctx)
+{
+  Fit *f = (Fit *)ctx;
+  PetscInt k;
+  Vec X;
+
+  PetscFunctionBegin;
+  PetscCall(TaoGetSolution(tao, &X));
+  PetscCall(EvaluateVec(f, X));
+  PetscCall(TaoGetIterationNumber(tao, &k));
+  if (k % STALLED == 0) {
+    if (k && Size(f->n, f->r) > (1 - SAME) * f->earlier) PetscCall(TaoSetConvergedReason(tao, TAO_CONVERGED_USER));
+    f->earlier = Size(f->n, f->r);
+  }
+  if (IsMinimum(f, MINIMUM / 100)) PetscCall(TaoSetConvergedReason(tao, TAO_CONVERGED_GATOL));
+  if (k >= ITERATIONS) PetscCall(TaoSetConvergedReason(tao, TAO_DIVERGED_MAXITS));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Minimises from X by a type. */
 static PetscErrorCode Minimise(Fit *f, const char type[], Vec X)
 {
   const PetscBool squares = (PetscBool)(strcmp(type, TAOBRGN) == 0);
-  Tao tao;
+  Tao tao, inner;
   Vec lo, hi, r;
   Mat J;
 
@@ -274,28 +314,12 @@ static PetscErrorCode Minimise(Fit *f, const char type[], Vec X)
     PetscCall(TaoSetObjectiveAndGradient(tao, NULL, Objective, f));
   PetscCall(TaoSetSolution(tao, X));
   PetscCall(TaoSetVariableBounds(tao, lo, hi));
-  /* The misfit is piecewise smooth: the absolute tolerance stands for round-off, and IsMinimum() judges the end. */
-  PetscCall(TaoSetTolerances(tao, 1e-14, 0, 0));
-  PetscCall(TaoSetMaximumIterations(tao, 200));
+  inner = tao;
+  if (squares) PetscCall(TaoBRGNGetSubsolver(tao, &inner));
+  PetscCall(TaoSetConvergenceTest(inner, Ends, f));
   PetscCall(TaoSolve(tao));
   HycoDestroyAll(&tao, &J, &r, &lo, &hi);
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Whether the last point is a minimum within the ranges, by the recomputed slope: a solver's flag is no evidence. */
-static PetscBool IsMinimum(const Fit *f)
-{
-  PetscReal g[HYCO_MAX_PARAMETERS], most = 0;
-
-  Slope(f, g);
-  for (PetscInt p = 0; p < f->n_par; p++) {
-    /* At an end of a range the slope may point outwards. */
-    const PetscBool held = (PetscBool)((f->x[p] <= 0 && g[p] > 0) || (f->x[p] >= 1 && g[p] < 0));
-
-    if (!held) most = PetscMax(most, PetscAbsReal(g[p]));
-  }
-  /* Relative to the sizes of J and r: the same answer whatever the units of the outputs. */
-  return (PetscBool)(Size(f->n, f->r) <= EXACT || most <= MINIMUM * Size(f->n * f->n_par, f->J) * Size(f->n, f->r));
 }
 
 /* From one start, by the requested type, and after it by the other one if that ends at no minimum. *minimum: the last point is
@@ -317,7 +341,7 @@ static PetscErrorCode RunFrom(Fit *f, const PetscReal start[], const char type[]
   for (PetscInt k = 0; k < 2 && !*minimum; k++) {
     PetscCall(Minimise(f, types[k], X));
     PetscCall(EvaluateVec(f, X));
-    *minimum = IsMinimum(f);
+    *minimum = IsMinimum(f, MINIMUM);
     PetscCall(PetscStrlcat(method, k ? ", then " : "", 64));
     PetscCall(PetscStrlcat(method, types[k], 64));
   }
