@@ -273,9 +273,13 @@ class Draft:
         p = block.parameters
         name = p["ELSET"].upper()
         keys = self.cells(f"{block.instance}.{name}" if block.instance else name, block)
-        if block.rows and item(block.rows[0], 0) not in (0, 1) and self.dim() == 2 and not any(t.startswith("CAX") for t in self.deck.types):
-            self.thickness = item(block.rows[0], 0)
-            self.notes.append(f"line {block.line}: *SOLID SECTION: the thickness {said(self.thickness)} is 1 here: forces of *CLOAD are divided by it, and so are reactions and contact forces")
+        thick = (item(block.rows[0], 0) if block.rows else 0) or 1.0
+        if self.dim() == 2 and not any(t.startswith("CAX") for t in self.deck.types):
+            if self.bodies and thick != self.thickness:
+                self.leave(block, "*SOLID SECTION of another thickness", "all bodies have one thickness, which is 1")
+            elif thick != 1:
+                self.notes.append(f"line {block.line}: *SOLID SECTION: the thickness {said(thick)} is 1 here: forces of *CLOAD are divided by it, and so are reactions and contact forces")
+            self.thickness = thick if not self.bodies else self.thickness
         alone = sum(b.word == "SOLID SECTION" and b.instance == block.instance for b in self.deck.rest) == 1
         title = self.free_name((block.instance if alone else f"{block.instance}.{name}") if block.instance else name, self.bodies)
         self.bodies[title] = (keys, p.get("MATERIAL", "").upper(), block)
@@ -298,6 +302,8 @@ class Draft:
     def on_contact_pair(self, block):
         p = block.parameters
         interaction = p.get("INTERACTION", "").upper()
+        if self.steps:
+            self.leave(block, "*CONTACT PAIR in a step", "contacts act from the beginning")
         for row in block.rows:
             row = [w for w in row if w]
             both = self.surfaces(row, block)
@@ -436,15 +442,18 @@ class Draft:
                     given[atom] = specs + (Given(len(self.steps), None, 0, "", block),) if len(self.steps) > 1 and specs else ()
         return True
 
-    def put(self, kind, atom, value, block, unit=1.0):
-        """What a load or support is from this step on."""
-        given, now = self.given.setdefault((kind, block.word), {}), max(len(self.steps), 1)
-        before, amplitude = given.get(atom, ()), block.parameters.get("AMPLITUDE", "").upper()
-        if kind not in ADDED:
-            before = tuple(g for g in before if g.step < now or g.value is None)
-        elif any(g.step == now and g.value is not None and g.amplitude != amplitude for g in before):
-            self.leave(block, f"*{block.word} twice in a step, with several amplitudes", "the sum is taken")
-        given[atom] = before + (Given(now, value, unit, amplitude, block),)
+    def put(self, kind, atoms, value, block, unit=1.0):
+        """What loads or supports are from this step on: of nodes and axes, faces or bodies."""
+        given, now, known = self.given.setdefault((kind, block.word), {}), max(len(self.steps), 1), {}
+        said_now = Given(now, value, unit, block.parameters.get("AMPLITUDE", "").upper(), block)
+        for atom in atoms:
+            before = given.get(atom, ())
+            if before not in known:
+                kept = before if kind in ADDED else tuple(g for g in before if g.step < now or g.value is None)
+                if kind in ADDED and any(g.step == now and g.value is not None and g.amplitude != said_now.amplitude for g in before):
+                    self.leave(block, f"*{block.word} twice in a step, with several amplitudes", "the sum is taken")
+                known[before] = (*kept, said_now)
+            given[atom] = known[before]
 
     def aim(self, kind, block, name, axis, members):
         """Names nodes or faces that have a value in common, at present."""
@@ -469,13 +478,12 @@ class Draft:
                 self.leave(block, f"*BOUNDARY of degree of freedom {max(dofs)}", "only displacements are prescribed")
             name = self.node_name(row[0], block, "_".join(map(str, dofs)) + (f"_{said(value)}" if value else ""))
             for d in dofs:
-                axis, mine = AXES[d - 1] if d <= 3 else d, nodes
+                axis, mine = AXES[d - 1] if d <= 3 else d, nodes if d <= dim else [n for n in nodes if n not in self.used]
                 if "FIXED" in p:
                     mine = [n for n in nodes if self.given.get(("fixed", "BOUNDARY"), {}).get((n, axis))]
                     if d <= dim and self.used.intersection(nodes) - set(mine):
                         self.leave(block, "*BOUNDARY, FIXED of what was free", "prescribe the displacement, as a number or an expression")
-                for n in mine:
-                    self.put("fixed", (n, axis), HELD if "FIXED" in p else value, block)
+                self.put("fixed", [(n, axis) for n in mine], HELD if "FIXED" in p else value, block)
                 held = [n for n in mine if n in self.used]
                 if d <= dim and held:
                     self.aim("fixed", block, name, axis, held)
@@ -484,12 +492,11 @@ class Draft:
         if not self.begun(block, "force"):
             return
         for row in block.rows:
-            nodes, d = self.nodes(row[0], block), int(row[1])
+            nodes, d = list(dict.fromkeys(self.nodes(row[0], block))), int(row[1])
             if not self.used.issuperset(nodes) or d > self.dim():
                 self.leave(block, "*CLOAD on a reference point or a rotation", "a load on a rigid or coupled body: see contact type rigid, or a traction")
                 continue
-            for n in nodes:
-                self.put("force", (n, AXES[d - 1]), item(row, 2) / self.thickness, block, 1 / self.thickness)
+            self.put("force", [(n, AXES[d - 1]) for n in nodes], item(row, 2) / self.thickness, block, 1 / self.thickness)
             self.aim("force", block, self.node_name(row[0], block, f"{d}_{said(item(row, 2))}", True), AXES[d - 1], nodes)
 
     def body_groups(self, word, block):
@@ -499,13 +506,13 @@ class Draft:
         return mine if mine and all(keys.issuperset(self.bodies[t][0]) for t in mine) else None
 
     def direction(self, row, block, kind, mine):
-        """The direction of a load, of length 1. One that changes is a new load for CalculiX."""
+        """The direction of a load, of length 1."""
         size = math.hypot(*(item(row, k) for k in (3, 4, 5))) or 1.0
         way, now = [item(row, 3 + c) / size for c in range(3)], len(self.steps)
         for key in mine:
             step, before, _ = self.ways.get((kind, key), (now, way, None))
             if step < now and before != way and ("new", block.word) not in self.steps[-1]["seen"]:
-                self.leave(block, f"*{block.word}, {row[1].upper()} whose direction changes", "it replaces the load of the step before; CalculiX adds it")
+                self.leave(block, f"*{block.word}, {row[1].upper()} whose direction changes", "it replaces the load of the step before" + ("; CalculiX adds it" if kind == "gravity" else ""))
             self.ways[kind, key] = (now, way, row)
         return way[:self.dim()]
 
@@ -527,18 +534,15 @@ class Draft:
             elif kind == "GRAV":
                 mine = self.body_groups(row[0], block)
                 for axis, c in zip(AXES, self.direction(row, block, "gravity", mine)):
-                    for title in mine:
-                        self.put("gravity", (title, axis), size * c, block, c)
+                    self.put("gravity", [(title, axis) for title in mine], size * c, block, c)
             elif kind == "CENTRIF":
-                for title in self.body_groups(row[0], block):
-                    self.put("rotation", title, size, block)
+                self.put("rotation", self.body_groups(row[0], block), size, block)
                 turns = ([item(row, k) for k in (3, 4, 5)], [item(row, k) for k in (6, 7, 8)])
                 if self.axis not in (None, turns):
                     self.leave(block, "*DLOAD, CENTRIF about several axes", "the last axis is taken")
                 self.axis = turns
             else:
-                for title in self.body_groups(row[0], block):
-                    self.put("body force", (title, kind[1].lower()), size, block)
+                self.put("body force", [(title, kind[1].lower()) for title in self.body_groups(row[0], block)], size, block)
 
     def press(self, block, name, faces, size, word):
         """A pressure on faces of cells."""
@@ -549,9 +553,8 @@ class Draft:
             self.notes.append(f"line {block.line}: *{block.word}: its pressure and that of *DLOAD or *DSLOAD of an earlier step are added; CalculiX replaces it")
         if block.word == "DSLOAD" and any(specs and specs[-1].value is not None and specs[-1].step < now and self.ways[f] != word for f, specs in fresh.items()):
             self.leave(block, "*DSLOAD on faces that another surface loads in an earlier step", "it replaces that load there")
-        for f in faces:
-            self.put("pressure", (f, ""), size, block)
-            self.ways[f] = word
+        self.put("pressure", [(f, "") for f in faces], size, block)
+        self.ways.update((f, word) for f in faces)
         self.aim("pressure", block, name, "", faces)
 
     def on_dsload(self, block):
@@ -566,8 +569,7 @@ class Draft:
                 self.press(block, name, faces, size, word)
             elif kind == "TRVEC":
                 for axis, c in zip(AXES, self.direction(row, block, "traction", [word])):
-                    for f in dict.fromkeys(faces):
-                        self.put("traction", (f, axis), size * c, block, c)
+                    self.put("traction", [(f, axis) for f in dict.fromkeys(faces)], size * c, block, c)
                     self.aim("traction", block, name, axis, faces)
             else:
                 self.leave(block, f"*DSLOAD of type {kind}")
@@ -594,8 +596,7 @@ class Draft:
                 self.leave(block, "*TEMPERATURE from a file", "write the field as an expression of x, y, z and t")
             return
         for row in block.rows:
-            for title in self.of_bodies(row[0], block):
-                self.put("temperature", title, item(row, 1), block)
+            self.put("temperature", self.of_bodies(row[0], block), item(row, 1), block)
 
     def course(self, kind, specs, start=0.0):
         """A load or support over time: rows (time, value), linear between them, with two rows at a jump."""
@@ -654,7 +655,8 @@ class Draft:
                 divided = len(found) > 1 or len(mine) < len(members) or kind != "fixed" and any((n, axis) in done for n in mine)
                 if not whole or not divided and not done.issuperset((n, axis) for n in mine):
                     for course, part in found.items():
-                        self.enter(kind, self.group(kind, name, part, whole), axis, 1.0, course)
+                        if kind != "traction" or any(v for _, v in course):
+                            self.enter(kind, self.group(kind, name, part, whole), axis, 1.0, course)
                         done.update((n, axis) for n in part)
         if kind == "fixed":
             for specs in {given[n, axis] for name, axis, members in targets for n in members if given[n, axis]}:
@@ -781,7 +783,7 @@ class Draft:
             if len({v for _, v in rows}) == 1:
                 text = said(factor * rows[0][1])
             else:
-                scale = 1.0 if kind != "ramp" else max((abs(v) for _, v in rows)) * (-1 if rows[-1][1] < 0 else 1)
+                scale = max((v for _, v in rows), key=abs) if kind == "ramp" else 1.0
                 shape = tuple((moment(t), said(v / scale)) for t, v in rows)
                 text = product(factor * scale, self.tables.setdefault(shape, f"{kind}{len(self.tables) + 1}"))
             out += text if not out or text.startswith("-") else "+" + text
