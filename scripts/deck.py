@@ -81,11 +81,16 @@ def summed(parts, begin, end):
     return out
 
 
+def bare(rows):
+    """The rows without those within a constant part."""
+    rows = [row for k, row in enumerate(rows) if not 0 < k < len(rows) - 1 or not rows[k - 1][1] == row[1] == rows[k + 1][1]]
+    return rows[:-1] if len(rows) > 1 and rows[-1][1] == rows[-2][1] and (len(rows) == 2 or rows[-2][0] > rows[-3][0]) else rows
+
+
 def steep(rows):
-    """The rows with increasing times: a jump becomes a line over a millionth of what follows. Rows within a constant part are left out."""
+    """The rows with increasing times: a jump becomes a line over a millionth of what follows."""
     out = [(t + max(1e-6 * (rows[k + 1][0] - t), 1e-13 * t) if k and t == rows[k - 1][0] else t, v) for k, (t, v) in enumerate(rows)]
-    out = [row for k, row in enumerate(out) if not 0 < k < len(out) - 1 or not out[k - 1][1] == row[1] == out[k + 1][1]]
-    return out[:-1] if len(out) > 2 and out[-1][1] == out[-2][1] else out
+    return bare(out)
 
 
 def moment(t):
@@ -114,6 +119,7 @@ class Draft:
         self.left, self.notes = {}, []
         self.bodies, self.materials, self.body_of, self.thickness = {}, {}, {}, 1.0
         self.interactions, self.contacts, self.ties, self.rigids, self.loose = {}, {}, {}, [], {}
+        self.material_now = self.interaction_now = None
         self.amplitudes, self.steps, self.initial = {}, [], {}
         self.given = {}    # by kind and keyword: what steps say of each degree of freedom, face or body
         self.targets = {}  # likewise, by name: the axes, and their nodes or faces, that the deck names together
@@ -206,25 +212,29 @@ class Draft:
                 self.leave(block, f"*ELEMENT, TYPE={name}", "cells are fully integrated, without hourglass control")
             elif name.startswith("C3D8I") or name in ("CPE4I", "CPS4I", "CAX4I"):
                 self.leave(block, f"*ELEMENT, TYPE={name}", "no incompatible modes: bending of such cells is stiffer")
-        material = interaction = None
         for block in self.deck.rest:
-            word, parameters, rows = block
-            if word == "MATERIAL":
-                material = self.materials.setdefault(parameters["NAME"].upper(), {})
-            elif word == "SURFACE INTERACTION":
-                interaction = self.interactions.setdefault(parameters["NAME"].upper(), {})
-            elif word in ("ELASTIC", "EXPANSION", "DENSITY", "PLASTIC", "CREEP") and material is not None:
-                getattr(self, "read_" + word.lower())(material, block)
-            elif word == "FRICTION":
-                self.read_friction(interaction, block)
-            elif word == "SURFACE BEHAVIOR" and interaction is not None:
-                if parameters.get("PRESSURE-OVERCLOSURE", "HARD").upper() == "TIED":
-                    interaction["tied"] = True
-            elif hasattr(self, "on_" + re.sub(r"\W", "_", word).lower()):
-                getattr(self, "on_" + re.sub(r"\W", "_", word).lower())(block)
-            elif word not in QUIET:
-                self.leave(block, f"*{word}", WHY.get(word))
+            try:
+                self.read(block)
+            except (KeyError, ValueError, IndexError) as error:
+                raise DeckError(f"line {block.line}: *{block.word} is not as it should be ({type(error).__name__}: {error})") from None
         self.finish()
+
+    def read(self, block):
+        word, parameters, _ = block
+        if word == "MATERIAL":
+            self.material_now = self.materials.setdefault(parameters["NAME"].upper(), {})
+        elif word == "SURFACE INTERACTION":
+            self.interaction_now = self.interactions.setdefault(parameters["NAME"].upper(), {})
+        elif word in ("ELASTIC", "EXPANSION", "DENSITY", "PLASTIC", "CREEP") and self.material_now is not None:
+            getattr(self, "read_" + word.lower())(self.material_now, block)
+        elif word == "FRICTION":
+            self.read_friction(self.interaction_now, block)
+        elif word == "SURFACE BEHAVIOR" and self.interaction_now is not None:
+            self.read_surface_behavior(self.interaction_now, block)
+        elif hasattr(self, "on_" + re.sub(r"\W", "_", word).lower()):
+            getattr(self, "on_" + re.sub(r"\W", "_", word).lower())(block)
+        elif word not in QUIET:
+            self.leave(block, f"*{word}", WHY.get(word))
 
     # ---- materials
 
@@ -310,7 +320,7 @@ class Draft:
             if not both:
                 continue
             slave, master = both
-            if "TIED" in p or self.interactions.get(interaction, {}).get("tied"):
+            if "TIED" in p:
                 self.ties[self.free_name(f"{slave}_{master}", self.ties)] = (slave, master, None)
                 continue
             reach = max(real(p["ADJUST"]) if re.fullmatch(r"[\d.eEdD+-]+", p.get("ADJUST", "")) else 0, 0)
@@ -625,7 +635,7 @@ class Draft:
                 same = abs(piece[0][1] - now) <= 1e-12 * max(abs(v) for _, v in (*piece, rows[-1]))
                 rows = [*(rows if begin else ()), *([(begin, now)] if begin > rows[-1][0] else ()), *(piece[1:] if same and begin else piece)]
             begin = end
-        return tuple(rows)
+        return tuple(bare(rows))
 
     def lasting(self, specs):
         """Lists what a support does that supports of a scene cannot."""
@@ -723,9 +733,14 @@ class Draft:
                 raise DeckError(f"line {g.block.line}: *{g.block.word} names the amplitude {g.amplitude}, which is not there")
         for block, nodes, at, turn in self.rigids:
             self.hold(block, nodes, at, turn)
+        for name, (slave, master, interaction, *_) in list(self.contacts.items()):
+            if self.interactions.get(interaction, {}).get("tied"):  # the interaction may stand after the contact
+                self.ties[self.free_name(f"{slave}_{master}", self.ties)] = (slave, master, None)
+                del self.contacts[name]
         for kind, word in self.targets:
             self.gather(kind, word)
         self.load_bodies()
+        self.soften()
         for kind, groups in self.kept.items():
             setattr(self.m, kind, groups)
         self.m.cell_groups = {title: keys for title, (keys, _, _) in self.bodies.items()}
@@ -745,6 +760,28 @@ class Draft:
         for axis, specs in zip(AXES, moves) if mine else ():  # rigid facets alone: their contacts are listed
             given.update({(n, axis): specs for n in mine})
             self.targets.setdefault(("fixed", "BOUNDARY"), {}).setdefault(name, {})[axis] = mine
+
+    def read_surface_behavior(self, interaction, block):
+        law = block.parameters.get("PRESSURE-OVERCLOSURE", "HARD").upper()
+        if law == "TIED":
+            interaction["tied"] = True
+        elif law == "LINEAR" and block.rows:
+            interaction["slope"] = (item(block.rows[0], 0), block)
+        elif law != "HARD":
+            self.leave(block, f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE={law}", "contact is hard")
+        if "NO SEPARATION" in block.parameters:
+            self.leave(block, "*SURFACE BEHAVIOR, NO SEPARATION", "contacts open; see tie in scenes.md")
+
+    def soften(self):
+        """Lists contact whose pressure rises so slowly with its overclosure that it is no penalty: not ten times as stiff as a body of the mesh's length."""
+        length = max(max(c) - min(c) for c in zip(*(self.m.nodes[n] for n in self.used)))
+        stiff = max((row[0] for m in self.materials.values() for row in m.get("elastic", ())), default=0.0)
+        for name in sorted({contact[2] for contact in self.contacts.values()}):
+            slope, block = self.interactions.get(name, {}).get("slope", (math.inf, None))
+            if slope * length < 10 * stiff:
+                self.leave(block, "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", "contact is hard")
+            elif block:
+                self.notes.append(f"line {block.line}: *SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR: taken as a penalty; contact is hard")
 
     def read_friction(self, interaction, block):
         """The coefficient of an interaction, of which other forms and changes within a step are left."""
@@ -825,8 +862,12 @@ class Draft:
             out["yield"] = said(rows[0][0])
             if len(rows) > 1:
                 out["hardening"] = said((rows[-1][0] - rows[0][0]) / (rows[-1][1] - rows[0][1]))
-        if "law" in out and any(self.m.cells[c][0] in ("tri3", "tet4") for c in self.bodies[title][0]):
+        kinds = {self.m.cells[c][0] for c in self.bodies[title][0]}
+        if "law" in out and kinds & {"tri3", "tet4"}:
             out["element"] = "standard"
+        elif "law" not in out and max(n for _, n, _ in rows) > 0.49 and kinds <= {"quad4", "hex8"} and self.formulation() != "plane_stress":
+            out["element"] = "bbar"
+            self.notes.append(f"line {block.line}: {title}: nearly incompressible: its cells do not lock, as those of Abaqus; CalculiX's do (element: standard)")
         return out
 
     def reach(self, slave, master):
