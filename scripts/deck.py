@@ -21,6 +21,7 @@ WHY = {"FRICTION": "only a constant coefficient of a surface interaction is fric
        "SHELL SECTION": "no shells", "BEAM SECTION": "no beams", "MEMBRANE SECTION": "no membranes", "CONNECTOR SECTION": "no connectors", "SPRING": "see spring: in scenes.md",
        "MASS": "no point masses", "DASHPOT": "no dampers", "CONTACT": "general contact: name the pairs of surfaces as contacts", "DYNAMIC": "no inertia", "DAMPING": "no inertia",
        "PRE-TENSION SECTION": "no pretension: prescribe a displacement of one side", "CYCLIC SYMMETRY MODEL": "no cyclic symmetry", "MODEL CHANGE": "bodies and contacts stay",
+       "CHANGE FRICTION": "the first coefficient stays", "CHANGE SURFACE BEHAVIOR": "the first law stays",
        "CONTACT CONTROLS": "no stabilisation is needed", "CONTACT STABILIZATION": "no stabilisation is needed"}
 
 
@@ -229,7 +230,7 @@ class Draft:
             getattr(self, "read_" + word.lower())(self.material_now, block)
         elif word == "FRICTION":
             self.read_friction(self.interaction_now, block)
-        elif word == "SURFACE BEHAVIOR" and self.interaction_now is not None:
+        elif word == "SURFACE BEHAVIOR" and self.interaction_now is not None and not self.steps:
             self.read_surface_behavior(self.interaction_now, block)
         elif hasattr(self, "on_" + re.sub(r"\W", "_", word).lower()):
             getattr(self, "on_" + re.sub(r"\W", "_", word).lower())(block)
