@@ -126,7 +126,7 @@ class Draft:
         self.targets = {}  # likewise, by name: the axes, and their nodes or faces, that the deck names together
         self.entry = {}    # by section, group and axis: factors and functions of time
         self.kept = {"facet_groups": {}, "node_groups": {}, "point_groups": {}}
-        self.ways, self.axis, self.differs = {}, None, {}
+        self.ways, self.axis, self.differs, self.early = {}, None, {}, set()  # early: blocks of supports before the first step
         self.groups, self.tables, self.skipped, self.frictionless = set(), {}, False, frictionless
 
     def leave(self, block, what, why=None):
@@ -457,12 +457,17 @@ class Draft:
         """What loads or supports are from this step on: of nodes and axes, faces or bodies."""
         given, now, known = self.given.setdefault((kind, block.word), {}), max(len(self.steps), 1), {}
         said_now = Given(now, value, unit, block.parameters.get("AMPLITUDE", "").upper(), block)
+        if not self.steps:
+            self.early.add(block)
         for atom in atoms:
             before = given.get(atom, ())
             if before not in known:
                 kept = before if kind in ADDED else tuple(g for g in before if g.step < now or g.value is None)
-                if kind in ADDED and any(g.step == now and g.value is not None and g.amplitude != said_now.amplitude for g in before):
+                twice = [g for g in before if g.step == now and g.value not in (None, HELD) and (g.block in self.early) == (block in self.early)]
+                if kind in ADDED and any(g.amplitude != said_now.amplitude for g in twice):
                     self.leave(block, f"*{block.word} twice in a step, with several amplitudes", "the sum is taken")
+                elif kind not in ADDED and any((g.value, g.amplitude) != (value, said_now.amplitude) for g in twice):
+                    self.leave(block, f"*{block.word} twice in a step, with several values", "the last one counts")
                 known[before] = (*kept, said_now)
             given[atom] = known[before]
 

@@ -391,10 +391,11 @@ class Decks(Case):
         second = '*STATIC\n0.1, 4.\n*BOUNDARY, OP=NEW, FIXED\nA_X1, 1, 1\n*BOUNDARY, OP=NEW\n' + hold + \
                  '*DSLOAD, OP=NEW\nF1, P, 20.\nF6, P, 10.\nF7, P, 1.\n*DSLOAD, OP=NEW, AMPLITUDE=LATE\nF3, P, 10.\n*DSLOAD, OP=NEW, AMPLITUDE=LONG\nF4, P, 8.\n'
         third = '*VISCO, CETOL=1.\n0.1, 10.\n*BOUNDARY\nA_X1, 1, 1, 0.3\n*DSLOAD\nF5, P, 6.\n*CLOAD\n2, 3, -5.\n*TEMPERATURE, OP=NEW\n'
-        fourth = '*STATIC\n0.1, 5.\n*BOUNDARY\nA_Y1, 2, 2\n*DSLOAD\nF6, P, 30.\n*DSLOAD, AMPLITUDE=FOURIER\nF2, P, 3.\n*CLOAD, OP=NEW\n'
+        fourth = '*STATIC\n0.1, 5.\n*BOUNDARY\nA_X0, 1, 1, 9.\nA_X0, 1, 1, 0.\nA_Y1, 2, 2\n*DSLOAD\nF6, P, 30.\n*DSLOAD, AMPLITUDE=FOURIER\nF2, P, 3.\n*CLOAD, OP=NEW\n'
         left, folder = self.convert('courses', deck([body], model + '*BOUNDARY\nA_Y0, 2, 2\n' + hold, [('', first), ('', second), ('', third), (', AMPLITUDE=STEP', fourth)],
                                                     STEEL + '*EXPANSION\n1E-5\n*CREEP, LAW=NORTON\n1E-20, 3., 0.\n'))
-        self.assertEqual([re.search(r'(\*.*?):', line)[1] for line in left], ['*AMPLITUDE, DEFINITION=PERIODIC', '*BOUNDARY, OP=NEW', '*BOUNDARY of what was free in the steps before'])
+        self.assertEqual([re.search(r'(\*.*?):', line)[1] for line in left], ['*AMPLITUDE, DEFINITION=PERIODIC', '*BOUNDARY, OP=NEW', '*BOUNDARY twice in a step, with several values',
+                                                                               '*BOUNDARY of what was free in the steps before'])
         with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
             draft = file.read()
         tables = {name: np.array(re.findall(r'\[([^\[\], ]+), ([^\[\], ]+)\]', rows), float).T for name, rows in re.findall(r'(?m)^    (\w+): (\[\[.*)$', draft)}
