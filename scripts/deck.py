@@ -1,6 +1,7 @@
 """A deck of Abaqus or CalculiX as a draft of scene.yaml (scripts/convert --scene): what has a counterpart is converted; each keyword that changes
 the mechanics and has none is listed with its line."""
 import bisect
+import collections
 import math
 import re
 
@@ -20,6 +21,7 @@ WHY = {"FRICTION": "only a constant coefficient of a surface interaction is fric
        "SHELL SECTION": "no shells", "BEAM SECTION": "no beams", "MEMBRANE SECTION": "no membranes", "CONNECTOR SECTION": "no connectors", "SPRING": "see spring: in scenes.md",
        "MASS": "no point masses", "DASHPOT": "no dampers", "CONTACT": "general contact: name the pairs of surfaces as contacts", "DYNAMIC": "no inertia", "DAMPING": "no inertia",
        "PRE-TENSION SECTION": "no pretension: prescribe a displacement of one side", "CYCLIC SYMMETRY MODEL": "no cyclic symmetry", "MODEL CHANGE": "bodies and contacts stay",
+       "CHANGE FRICTION": "the first coefficient stays", "CHANGE SURFACE BEHAVIOR": "the first law stays",
        "CONTACT CONTROLS": "no stabilisation is needed", "CONTACT STABILIZATION": "no stabilisation is needed"}
 
 
@@ -51,6 +53,52 @@ def product(value, name):
     return said(value) if not name else name if value == 1 else f"-{name}" if value == -1 else f"{said(value)}*{name}"
 
 
+# What a step says of a load or support: its value (None: it ends; HELD: it keeps its present value), the value of an absolute amplitude's 1, the
+# amplitude's name
+Given = collections.namedtuple("Given", "step value unit amplitude block")
+HELD = "held"
+ADDED = ("force", "body force", "pressure", "traction", "gravity", "rotation")  # given twice in one step they are added
+KNOWN = {"OP", "AMPLITUDE", "LOAD CASE", "REGION TYPE", "FOLLOWER", "TYPE", "FIXED"}  # parameters of loads and supports that are read, or change nothing
+
+
+def value_at(rows, t, after):
+    """The value of a function [(t, value)], linear between rows and constant outside; at a jump (two rows of one time) before or after it."""
+    k = (bisect.bisect_right if after else bisect.bisect_left)([row[0] for row in rows], t)
+    if k == 0 or k == len(rows):
+        return rows[min(k, len(rows) - 1)][1]
+    (a, v), (b, w) = rows[k - 1:k + 1]
+    return v if a == t else w if b == t else v + (w - v) * (t - a) / (b - a)
+
+
+def summed(parts, begin, end):
+    """The sum of functions [(factor, rows)] from one time to another, as rows."""
+    near, out = 1e-9 * (end - begin), []
+    for t in sorted({begin, end, *(t for _, rows in parts for t, _ in rows if begin + near < t < end - near)}):
+        for after in (False, True):
+            if (after or t > begin) and (t < end or not after):
+                row = (t, sum(factor * value_at(rows, t, after) for factor, rows in parts))
+                if not out or out[-1] != row:
+                    out.append(row)
+    return out
+
+
+def bare(rows):
+    """The rows without those within a constant part."""
+    rows = [row for k, row in enumerate(rows) if not 0 < k < len(rows) - 1 or not rows[k - 1][1] == row[1] == rows[k + 1][1]]
+    return rows[:-1] if len(rows) > 1 and rows[-1][1] == rows[-2][1] and (len(rows) == 2 or rows[-2][0] > rows[-3][0]) else rows
+
+
+def steep(rows):
+    """The rows with increasing times: a jump becomes a line over a millionth of what follows."""
+    out = [(t + max(1e-6 * (rows[k + 1][0] - t), 1e-13 * t) if k and t == rows[k - 1][0] else t, v) for k, (t, v) in enumerate(rows)]
+    return bare(out)
+
+
+def moment(t):
+    """A time as text, with the digits of a steep line."""
+    return f"{t + 0.0:.15g}"
+
+
 def quoted(text):
     return f'"{text}"' if re.search(r"[:#,\[\]{}?&*!|>'%@`]|^[-\s]|^$", text) and not re.fullmatch(r"-?[\d.e+-]+", text) else text
 
@@ -72,8 +120,13 @@ class Draft:
         self.left, self.notes = {}, []
         self.bodies, self.materials, self.body_of, self.thickness = {}, {}, {}, 1.0
         self.interactions, self.contacts, self.ties, self.rigids, self.loose = {}, {}, {}, [], {}
-        self.amplitudes, self.steps, self.values, self.initial, self.reference = {}, [], {}, {}, {}
-        self.held = {}  # by nodes and degree of freedom: the group that holds them
+        self.material_now = self.interaction_now = None
+        self.amplitudes, self.steps, self.initial = {}, [], {}
+        self.given = {}    # by kind and keyword: what steps say of each degree of freedom, face or body
+        self.targets = {}  # likewise, by name: the axes, and their nodes or faces, that the deck names together
+        self.entry = {}    # by section, group and axis: factors and functions of time
+        self.kept = {"facet_groups": {}, "node_groups": {}, "point_groups": {}}
+        self.ways, self.axis, self.differs, self.early = {}, None, {}, set()  # early: blocks of supports before the first step
         self.groups, self.tables, self.skipped, self.frictionless = set(), {}, False, frictionless
 
     def leave(self, block, what, why=None):
@@ -123,26 +176,20 @@ class Draft:
         word = word.strip('"').upper()
         return bool(re.fullmatch(r"(.*\.)?\d+", word)) and word not in self.deck.nsets and word not in self.deck.elsets
 
-    def node_group(self, word, block, what, points=False):
+    def node_name(self, word, block, what, points=False):
         """The name of a group of these nodes; single nodes of one block with the same `what` are one group. points: on which forces act."""
         name = self.plain(f"{block.word}_{block.line}_{what}" if self.alone(word) else word.strip('"').upper())
         if points:
-            name += "_points"
-        elif name in self.bodies or name in map(self.plain, self.deck.surfaces):
-            name += "_nodes"  # the name of other groups too
-        groups = self.m.point_groups if points else self.m.node_groups
-        if self.alone(word):
-            groups.setdefault(name, []).extend(self.nodes(word, block))
-        else:
-            groups[name] = self.nodes(word, block)
-        self.groups.add(name)
-        return name
+            return name + "_points"
+        return name + "_nodes" if name in self.bodies or name in map(self.plain, self.deck.surfaces) else name  # the name of other groups too
 
     def facet_group(self, word, block):
         word = word.strip('"').upper()
-        if word not in self.deck.surfaces and word in self.deck.nsets:
-            self.m.node_groups[self.plain(word)] = self.deck.nsets[word]
-        elif word not in self.deck.surfaces:
+        if word in self.deck.surfaces:
+            self.kept["facet_groups"][self.plain(word)] = self.deck.surfaces[word]
+        elif word in self.deck.nsets:
+            self.kept["node_groups"][self.plain(word)] = self.deck.nsets[word]
+        else:
             raise DeckError(f"line {block.line}: *{block.word} names {word}, which is no surface (only those of elements and nodes are read)")
         self.groups.add(self.plain(word))
         return self.plain(word)
@@ -166,25 +213,29 @@ class Draft:
                 self.leave(block, f"*ELEMENT, TYPE={name}", "cells are fully integrated, without hourglass control")
             elif name.startswith("C3D8I") or name in ("CPE4I", "CPS4I", "CAX4I"):
                 self.leave(block, f"*ELEMENT, TYPE={name}", "no incompatible modes: bending of such cells is stiffer")
-        material = interaction = None
         for block in self.deck.rest:
-            word, parameters, rows = block
-            if word == "MATERIAL":
-                material = self.materials.setdefault(parameters["NAME"].upper(), {})
-            elif word == "SURFACE INTERACTION":
-                interaction = self.interactions.setdefault(parameters["NAME"].upper(), {})
-            elif word in ("ELASTIC", "EXPANSION", "DENSITY", "PLASTIC", "CREEP") and material is not None:
-                getattr(self, "read_" + word.lower())(material, block)
-            elif word == "FRICTION":
-                self.read_friction(interaction, block)
-            elif word == "SURFACE BEHAVIOR" and interaction is not None:
-                if parameters.get("PRESSURE-OVERCLOSURE", "HARD").upper() == "TIED":
-                    interaction["tied"] = True
-            elif hasattr(self, "on_" + re.sub(r"\W", "_", word).lower()):
-                getattr(self, "on_" + re.sub(r"\W", "_", word).lower())(block)
-            elif word not in QUIET:
-                self.leave(block, f"*{word}", WHY.get(word))
+            try:
+                self.read(block)
+            except (KeyError, ValueError, IndexError) as error:
+                raise DeckError(f"line {block.line}: *{block.word} is not as it should be ({type(error).__name__}: {error})") from None
         self.finish()
+
+    def read(self, block):
+        word, parameters, _ = block
+        if word == "MATERIAL":
+            self.material_now = self.materials.setdefault(parameters["NAME"].upper(), {})
+        elif word == "SURFACE INTERACTION":
+            self.interaction_now = self.interactions.setdefault(parameters["NAME"].upper(), {})
+        elif word in ("ELASTIC", "EXPANSION", "DENSITY", "PLASTIC", "CREEP") and self.material_now is not None:
+            getattr(self, "read_" + word.lower())(self.material_now, block)
+        elif word == "FRICTION":
+            self.read_friction(self.interaction_now, block)
+        elif word == "SURFACE BEHAVIOR" and self.interaction_now is not None and not self.steps:
+            self.read_surface_behavior(self.interaction_now, block)
+        elif hasattr(self, "on_" + re.sub(r"\W", "_", word).lower()):
+            getattr(self, "on_" + re.sub(r"\W", "_", word).lower())(block)
+        elif word not in QUIET:
+            self.leave(block, f"*{word}", WHY.get(word))
 
     # ---- materials
 
@@ -233,9 +284,13 @@ class Draft:
         p = block.parameters
         name = p["ELSET"].upper()
         keys = self.cells(f"{block.instance}.{name}" if block.instance else name, block)
-        if block.rows and item(block.rows[0], 0) not in (0, 1) and self.dim() == 2 and not any(t.startswith("CAX") for t in self.deck.types):
-            self.thickness = item(block.rows[0], 0)
-            self.notes.append(f"line {block.line}: *SOLID SECTION: the thickness {said(self.thickness)} is 1 here: forces of *CLOAD are divided by it, and so are reactions and contact forces")
+        thick = (item(block.rows[0], 0) if block.rows else 0) or 1.0
+        if self.dim() == 2 and not any(t.startswith("CAX") for t in self.deck.types):
+            if self.bodies and thick != self.thickness:
+                self.leave(block, "*SOLID SECTION of another thickness", "all bodies have one thickness, which is 1")
+            elif thick != 1:
+                self.notes.append(f"line {block.line}: *SOLID SECTION: the thickness {said(thick)} is 1 here: forces of *CLOAD are divided by it, and so are reactions and contact forces")
+            self.thickness = thick if not self.bodies else self.thickness
         alone = sum(b.word == "SOLID SECTION" and b.instance == block.instance for b in self.deck.rest) == 1
         title = self.free_name((block.instance if alone else f"{block.instance}.{name}") if block.instance else name, self.bodies)
         self.bodies[title] = (keys, p.get("MATERIAL", "").upper(), block)
@@ -258,13 +313,15 @@ class Draft:
     def on_contact_pair(self, block):
         p = block.parameters
         interaction = p.get("INTERACTION", "").upper()
+        if self.steps:
+            self.leave(block, "*CONTACT PAIR in a step", "contacts act from the beginning")
         for row in block.rows:
             row = [w for w in row if w]
             both = self.surfaces(row, block)
             if not both:
                 continue
             slave, master = both
-            if "TIED" in p or self.interactions.get(interaction, {}).get("tied"):
+            if "TIED" in p:
                 self.ties[self.free_name(f"{slave}_{master}", self.ties)] = (slave, master, None)
                 continue
             reach = max(real(p["ADJUST"]) if re.fullmatch(r"[\d.eEdD+-]+", p.get("ADJUST", "")) else 0, 0)
@@ -327,15 +384,20 @@ class Draft:
 
     def on_step(self, block):
         self.skipped = False
-        self.steps.append({"block": block, "period": 1.0, "kind": "", "ramp": block.parameters.get("AMPLITUDE", "").upper() != "STEP"})
+        self.steps.append({"period": 1.0, "ramp": True, "creeps": False, "variation": block.parameters.get("AMPLITUDE", "").upper(), "seen": set()})
         if "NLGEOM" in block.parameters and block.parameters["NLGEOM"].upper() != "NO":
             self.leave(block, "*STEP, NLGEOM", "displacements and rotations are small")
         if "PERTURBATION" in block.parameters:
             self.leave(block, "*STEP, PERTURBATION", "the step is taken as an ordinary one")
 
     def procedure(self, block):
-        step = self.steps[-1] if self.steps else {}
-        step.update(kind=block.word, period=item(block.rows[0], 1, 1.0) if block.rows else 1.0)
+        at_once = block.word == "VISCO" or block.word != "STATIC" and "STEADY STATE" not in block.parameters
+        if "RIKS" in block.parameters:
+            self.leave(block, "*STATIC, RIKS", "loads follow the time, not an arc length")
+        if self.steps:
+            step = self.steps[-1]
+            step.update(period=item(block.rows[0], 1) or 1.0 if block.rows else 1.0, ramp=(step["variation"] or ("STEP" if at_once else "RAMP")) == "RAMP",
+                        creeps=at_once and block.parameters.get("CREEP", "").upper() != "NONE")
 
     on_static = on_visco = procedure
 
@@ -352,39 +414,73 @@ class Draft:
     on_dynamic = on_frequency = on_buckle = on_heat_transfer = on_modal_dynamic = on_steady_state_dynamics = on_substructure_generate = other
 
     def on_amplitude(self, block):
-        p = block.parameters
-        if p.get("DEFINITION", "TABULAR").upper() != "TABULAR" or p.get("VALUE", "RELATIVE").upper() != "RELATIVE":
-            self.leave(block, f"*AMPLITUDE, DEFINITION={p.get('DEFINITION', 'TABULAR').upper()}", "its loads are ramps; write the function as a table of the history")
-            return
+        """(rows, whether in total time, whether its values replace those of the loads); None: its loads follow the step's default."""
+        p, name = block.parameters, block.parameters["NAME"].upper()
+        kind = p.get("DEFINITION", "TABULAR").upper()
         numbers = [real(w) for row in block.rows for w in row if w]
-        self.amplitudes[p["NAME"].upper()] = (list(zip(numbers[::2], numbers[1::2])), "TIME" in p and p["TIME"].upper().startswith("TOTAL"))
+        odd = f"DEFINITION={kind}" if kind not in ("TABULAR", "EQUALLY SPACED", "SMOOTH STEP") else next((w for w in ("INPUT", "USER", "SCALEX", "SCALEY") if w in p), "")
+        if odd or not numbers:
+            self.amplitudes[name] = None
+            self.leave(block, f"*AMPLITUDE, {odd}" if odd else "*AMPLITUDE without rows", "its loads are as without an amplitude; write the function as a table of the history")
+            return
+        rows = [(real(p.get("BEGIN")) + real(p["FIXED INTERVAL"]) * k, v) for k, v in enumerate(numbers)] if kind == "EQUALLY SPACED" else list(zip(numbers[::2], numbers[1::2]))
+        if any(b[0] < a[0] for a, b in zip(rows, rows[1:])):
+            raise DeckError(f"line {block.line}: the times of *AMPLITUDE {name} do not increase")
+        if kind == "SMOOTH STEP":
+            self.leave(block, "*AMPLITUDE, DEFINITION=SMOOTH STEP", "it is linear between its rows, at which it is as in the deck")
+        self.amplitudes[name] = ([(t + real(p.get("SHIFTX")), v + real(p.get("SHIFTY"))) for t, v in rows], p.get("TIME", "").upper().startswith("TOTAL"),
+                                 p.get("VALUE", "").upper() == "ABSOLUTE")
 
-    def put(self, key, value, block):
-        """The value of a load or support from this step on."""
+    # ---- loads and supports, step by step
+
+    def begun(self, block, *kinds):
+        """Whether the loads of a block count; OP=NEW of the first block of its keyword in a step ends those of the steps before."""
         if self.skipped:
-            return
-        self.values.setdefault(key, []).append((len(self.steps), value, block.parameters.get("AMPLITUDE", "").upper()))
+            return False
+        new = block.parameters.get("OP", "MOD").upper() == "NEW"
+        for name in sorted(set(block.parameters) - KNOWN):
+            self.leave(block, f"*{block.word}, {name}", "what this parameter says is not taken")
+        if self.steps and block.word in self.steps[-1]["seen"]:
+            if new and ("new", block.word) not in self.steps[-1]["seen"]:
+                self.leave(block, f"*{block.word}, OP=NEW after one without it in a step", "only the first of a step ends earlier loads")
+        elif self.steps:
+            self.steps[-1]["seen"].update({block.word, *([("new", block.word)] if new else [])})
+            if new and block.word == "DLOAD" and any(self.given.get((kind, "DSLOAD")) for kind in kinds):
+                self.notes.append(f"line {block.line}: *DLOAD, OP=NEW: loads of *DSLOAD stay, as in Abaqus; CalculiX ends them too")
+            for kind in kinds if new else ():
+                given = self.given.get((kind, block.word), {})
+                for atom, specs in given.items():
+                    given[atom] = specs + (Given(len(self.steps), None, 0, "", block),) if len(self.steps) > 1 and specs else ()
+        return True
 
-    def renewed(self, block, kinds):
-        """OP=NEW: loads of earlier steps end."""
-        if block.parameters.get("OP", "MOD").upper() != "NEW" or len(self.steps) < 2:
-            return
-        mark = (len(self.steps), block.word)
-        if mark in self.steps[-1].setdefault("renewed", set()):
-            return
-        self.steps[-1]["renewed"].add(mark)
-        for key, history in self.values.items():
-            if key[0] in kinds and history[-1][0] < len(self.steps):
-                if key[0] == "fixed":
-                    self.leave(block, "*BOUNDARY, OP=NEW", "a support that ends: supports last for the whole history")
-                else:
-                    history.append((len(self.steps), 0.0, ""))
+    def put(self, kind, atoms, value, block, unit=1.0):
+        """What loads or supports are from this step on: of nodes and axes, faces or bodies."""
+        given, now, known = self.given.setdefault((kind, block.word), {}), max(len(self.steps), 1), {}
+        said_now = Given(now, value, unit, block.parameters.get("AMPLITUDE", "").upper(), block)
+        if not self.steps:
+            self.early.add(block)
+        for atom in atoms:
+            before = given.get(atom, ())
+            if before not in known:
+                kept = before if kind in ADDED else tuple(g for g in before if g.step < now or g.value is None)
+                twice = [g for g in before if g.step == now and g.value not in (None, HELD) and (g.block in self.early) == (block in self.early)]
+                if kind in ADDED and any(g.amplitude != said_now.amplitude for g in twice):
+                    self.leave(block, f"*{block.word} twice in a step, with several amplitudes", "the sum is taken")
+                elif kind not in ADDED and any((g.value, g.amplitude) != (value, said_now.amplitude) for g in twice):
+                    self.leave(block, f"*{block.word} twice in a step, with several values", "the last one counts")
+                known[before] = (*kept, said_now)
+            given[atom] = known[before]
+
+    def aim(self, kind, block, name, axis, members):
+        """Names nodes or faces that have a value in common, at present."""
+        self.targets.setdefault((kind, block.word), {}).setdefault(name, {}).setdefault(axis, []).extend(members)
 
     def on_boundary(self, block):
-        self.renewed(block, ("fixed",))
+        if not self.begun(block, "fixed"):
+            return
         p, dim = block.parameters, self.dim()
-        if "TYPE" in p and p["TYPE"].upper() != "DISPLACEMENT" or "FIXED" in p or "SUBMODEL" in p or "USER" in p:
-            self.leave(block, "*BOUNDARY, " + ", ".join(w for w in ("TYPE", "FIXED", "SUBMODEL", "USER") if w in p), "prescribe the displacement, as a number or an expression")
+        if "TYPE" in p and p["TYPE"].upper() != "DISPLACEMENT" or "SUBMODEL" in p or "USER" in p:
+            self.leave(block, "*BOUNDARY, " + ", ".join(w for w in ("TYPE", "SUBMODEL", "USER") if w in p), "prescribe the displacement, as a number or an expression")
             return
         for row in block.rows:
             row = row + [""] * (4 - len(row))
@@ -394,40 +490,30 @@ class Draft:
                 first = int(row[1] or 1)
                 dofs, value = range(first, int(row[2] or first) + 1), real(row[3])
             nodes = self.nodes(row[0], block)
-            held = [n for n in nodes if n in self.used]
-            for n in set(nodes) - set(held):
-                self.reference.setdefault(n, {}).update({d: (value, block) for d in dofs})
-            if not held:
-                continue
-            group = None
+            if any(d > 6 for d in dofs):
+                self.leave(block, f"*BOUNDARY of degree of freedom {max(dofs)}", "only displacements are prescribed")
+            name = self.node_name(row[0], block, "_".join(map(str, dofs)) + (f"_{said(value)}" if value else ""))
             for d in dofs:
-                if d <= dim:
-                    # a later value for the same nodes replaces the earlier one, as in the deck
-                    before = self.held.get((frozenset(held), d))
-                    if not before:
-                        group = group or self.node_group(row[0], block, "_".join(map(str, dofs)) + (f"_{said(value)}" if value else ""))
-                        self.held[frozenset(held), d] = group
-                    self.put(("fixed", before or group, AXES[d - 1]), value, block)
-                elif d > 6:
-                    self.leave(block, f"*BOUNDARY of degree of freedom {d}", "only displacements are prescribed")
+                axis, mine = AXES[d - 1] if d <= 3 else d, nodes if d <= dim else [n for n in nodes if n not in self.used]
+                if "FIXED" in p:
+                    mine = [n for n in nodes if self.given.get(("fixed", "BOUNDARY"), {}).get((n, axis))]
+                    if d <= dim and self.used.intersection(nodes) - set(mine):
+                        self.leave(block, "*BOUNDARY, FIXED of what was free", "prescribe the displacement, as a number or an expression")
+                self.put("fixed", [(n, axis) for n in mine], HELD if "FIXED" in p else value, block)
+                held = [n for n in mine if n in self.used]
+                if d <= dim and held:
+                    self.aim("fixed", block, name, axis, held)
 
     def on_cload(self, block):
-        self.renewed(block, ("force",))
+        if not self.begun(block, "force"):
+            return
         for row in block.rows:
-            nodes, d = self.nodes(row[0], block), int(row[1])
-            held = [n for n in nodes if n in self.used]
-            if len(held) < len(nodes) or d > self.dim():
+            nodes, d = list(dict.fromkeys(self.nodes(row[0], block))), int(row[1])
+            if not self.used.issuperset(nodes) or d > self.dim():
                 self.leave(block, "*CLOAD on a reference point or a rotation", "a load on a rigid or coupled body: see contact type rigid, or a traction")
                 continue
-            self.put(("force", self.node_group(row[0], block, f"{d}_{said(item(row, 2))}", True), AXES[d - 1]), item(row, 2) / self.thickness, block)
-
-    def pressure_group(self, word, face, value, block):
-        """The group of a face of cells; faces of single cells with one pressure in one block are one group."""
-        name = self.plain(f"PRESSURE_{block.line}_{said(value)}" if self.alone(word) else f"{word.strip(chr(34)).upper()}_P{face}")
-        mine = self.m.facet_groups.setdefault(name, [])
-        mine += [(c, face - 1) for c in self.cells(word, block) if (c, face - 1) not in mine]
-        self.groups.add(name)
-        return name
+            self.put("force", [(n, AXES[d - 1]) for n in nodes], item(row, 2) / self.thickness, block, 1 / self.thickness)
+            self.aim("force", block, self.node_name(row[0], block, f"{d}_{said(item(row, 2))}", True), AXES[d - 1], nodes)
 
     def body_groups(self, word, block):
         """The bodies that a set of elements consists of; None if it divides one."""
@@ -435,49 +521,82 @@ class Draft:
         mine = [title for title, (cells, _, _) in self.bodies.items() if keys.intersection(cells)]
         return mine if mine and all(keys.issuperset(self.bodies[t][0]) for t in mine) else None
 
+    def direction(self, row, block, kind, mine):
+        """The direction of a load, of length 1."""
+        size = math.hypot(*(item(row, k) for k in (3, 4, 5))) or 1.0
+        way, now = [item(row, 3 + c) / size for c in range(3)], len(self.steps)
+        for key in mine:
+            step, before, _ = self.ways.get((kind, key), (now, way, None))
+            if step < now and before != way and ("new", block.word) not in self.steps[-1]["seen"]:
+                self.leave(block, f"*{block.word}, {row[1].upper()} whose direction changes", "it replaces the load of the step before" + ("; CalculiX adds it" if kind == "gravity" else ""))
+            self.ways[kind, key] = (now, way, row)
+        return way[:self.dim()]
+
     def on_dload(self, block):
-        self.renewed(block, ("pressure", "gravity", "rotation", "body force"))
+        if not self.begun(block, "pressure", "gravity", "rotation", "body force"):
+            return
         for row in block.rows:
-            kind = row[1].upper()
+            kind, size = row[1].upper(), item(row, 2)
             face = re.fullmatch(r"P(\d)", kind)
-            if kind == "GRAV":
-                size = math.hypot(*(item(row, k) for k in (3, 4, 5))) or 1.0
-                if self.body_groups(row[0], block) != list(self.bodies):
-                    self.notes.append(f"line {block.line}: *DLOAD, GRAV: gravity acts on all bodies with a density, not on {row[0]} alone")
-                for c in range(self.dim()):
-                    if item(row, 3 + c):
-                        self.put(("gravity", "", AXES[c]), item(row, 2) * item(row, 3 + c) / size, block)
-            elif kind == "CENTRIF":
-                self.put(("rotation", "", "speed"), math.sqrt(max(item(row, 2), 0)), block)
-                self.axis = ([item(row, k) for k in (3, 4, 5)], [item(row, k) for k in (6, 7, 8)])
-            elif kind in ("BX", "BY", "BZ") and self.body_groups(row[0], block):
-                for title in self.body_groups(row[0], block):
-                    self.put(("force", title, kind[1].lower()), item(row, 2), block)
-            elif face and not any(c in self.body_of for c in self.cells(row[0], block)):
+            if face and not any(c in self.body_of for c in self.cells(row[0], block)):
                 self.leave(block, "*DLOAD on elements that are no solids")
             elif face:
-                self.put(("pressure", self.pressure_group(row[0], int(face[1]), item(row, 2), block), ""), item(row, 2), block)
-            else:
+                name = self.plain(f"PRESSURE_{block.line}_{said(size)}" if self.alone(row[0]) else f"{row[0].strip(chr(34)).upper()}_P{face[1]}")
+                self.press(block, name, [(c, int(face[1]) - 1) for c in self.cells(row[0], block)], size, row[0])
+            elif kind not in ("GRAV", "CENTRIF", "BX", "BY", "BZ"):
                 self.leave(block, f"*DLOAD of type {kind}")
+            elif not self.body_groups(row[0], block):
+                self.leave(block, f"*DLOAD of type {kind} on a part of a body", "write it as a force of the body, an expression of x, y and z")
+            elif kind == "GRAV":
+                mine = self.body_groups(row[0], block)
+                for axis, c in zip(AXES, self.direction(row, block, "gravity", mine)):
+                    self.put("gravity", [(title, axis) for title in mine], size * c, block, c)
+            elif kind == "CENTRIF":
+                self.put("rotation", self.body_groups(row[0], block), size, block)
+                turns = ([item(row, k) for k in (3, 4, 5)], [item(row, k) for k in (6, 7, 8)])
+                if self.axis not in (None, turns):
+                    self.leave(block, "*DLOAD, CENTRIF about several axes", "the last axis is taken")
+                self.axis = turns
+            else:
+                self.put("body force", [(title, kind[1].lower()) for title in self.body_groups(row[0], block)], size, block)
+
+    def press(self, block, name, faces, size, word):
+        """A pressure on faces of cells."""
+        now, faces = len(self.steps), list(dict.fromkeys(faces))
+        mine, others = self.given.get(("pressure", block.word), {}), self.given.get(("pressure", "DLOAD" if block.word == "DSLOAD" else "DSLOAD"), {})
+        fresh = {f: mine.get((f, ""), ()) for f in faces}
+        if any(any(g.step < now for g in others.get((f, ""), ())) for f in faces):
+            self.notes.append(f"line {block.line}: *{block.word}: its pressure and that of *DLOAD or *DSLOAD of an earlier step are added; CalculiX replaces it")
+        if block.word == "DSLOAD" and any(specs and specs[-1].value is not None and specs[-1].step < now and self.ways[f] != word for f, specs in fresh.items()):
+            self.leave(block, "*DSLOAD on faces that another surface loads in an earlier step", "it replaces that load there")
+        self.put("pressure", [(f, "") for f in faces], size, block)
+        self.ways.update((f, word) for f in faces)
+        self.aim("pressure", block, name, "", faces)
 
     def on_dsload(self, block):
-        self.renewed(block, ("pressure", "traction"))
+        if not self.begun(block, "pressure", "traction"):
+            return
         for row in block.rows:
-            kind = row[1].upper()
+            kind, size, word = row[1].upper(), item(row, 2), row[0].strip('"').upper()
+            if word not in self.deck.surfaces:
+                raise DeckError(f"line {block.line}: *DSLOAD names {word}, which is no surface of elements")
+            faces, name = self.deck.surfaces[word], self.plain(word)
             if kind in ("P", "P1", "PNOR"):
-                self.put(("pressure", self.facet_group(row[0], block), ""), item(row, 2), block)
+                self.press(block, name, faces, size, word)
             elif kind == "TRVEC":
-                size = math.hypot(*(item(row, k) for k in (3, 4, 5))) or 1.0
-                for c in range(self.dim()):
-                    if item(row, 3 + c):
-                        self.put(("traction", self.facet_group(row[0], block), AXES[c]), item(row, 2) * item(row, 3 + c) / size, block)
+                for axis, c in zip(AXES, self.direction(row, block, "traction", [word])):
+                    self.put("traction", [(f, axis) for f in dict.fromkeys(faces)], size * c, block, c)
+                    self.aim("traction", block, name, axis, faces)
             else:
                 self.leave(block, f"*DSLOAD of type {kind}")
 
     def of_bodies(self, word, block):
-        """The bodies all of whose nodes are in a set."""
+        """The bodies all of whose nodes are in a set; the rest of which is listed."""
         keys = set(self.nodes(word, block))
-        return [title for title, (cells, _, _) in self.bodies.items() if all(keys.issuperset(self.m.cells[c][1]) for c in cells)]
+        mine = [title for title, (cells, _, _) in self.bodies.items() if all(keys.issuperset(self.m.cells[c][1]) for c in cells)]
+        if (keys & self.used) - {n for title in mine for c in self.bodies[title][0] for n in self.m.cells[c][1]}:
+            self.leave(block, f"*{block.word} of a part of a body", "write the temperature as an expression of x, y, z")
+        return mine
 
     def on_initial_conditions(self, block):
         if block.parameters.get("TYPE", "").upper() != "TEMPERATURE":
@@ -488,15 +607,116 @@ class Draft:
                 self.initial[title] = item(row, 1)
 
     def on_temperature(self, block):
-        if not block.rows or "FILE" in block.parameters:
-            self.leave(block, "*TEMPERATURE from a file", "write the field as an expression of x, y, z and t")
+        if "FILE" in block.parameters or not self.begun(block, "temperature") or not block.rows and block.parameters.get("OP", "").upper() != "NEW":
+            if not self.skipped:
+                self.leave(block, "*TEMPERATURE from a file", "write the field as an expression of x, y, z and t")
             return
         for row in block.rows:
-            mine = self.of_bodies(row[0], block)
-            if not mine:
-                self.leave(block, "*TEMPERATURE of a part of a body", "write the field as an expression of x, y, z")
-            for title in mine:
-                self.put(("temperature", title, ""), item(row, 1), block)
+            self.put("temperature", self.of_bodies(row[0], block), item(row, 1), block)
+
+    def course(self, kind, specs, start=0.0):
+        """A load or support over time: rows (time, value), linear between them, with two rows at a jump."""
+        rows, begin, follow, rest = [(0.0, start)], 0.0, [], 0.0
+        for k, step in enumerate(self.steps, 1):
+            end, now, mine, piece = begin + step["period"], rows[-1][1], [g for g in specs if g.step == k], []
+            values = [g for g in mine if g.value not in (None, HELD)]
+            if mine:
+                read = [(g, *self.amplitudes[g.amplitude]) for g in values if self.amplitudes.get(g.amplitude)]
+                curves = [(g.unit if absolute else g.value, table if total else [(t + begin, v) for t, v in table], total) for g, table, total, absolute in read]
+                default = [g.value for g in values if not self.amplitudes.get(g.amplitude)]
+                follow = [curve[:2] for curve in curves if curve[2]]  # an amplitude in total time goes on in later steps
+                if values or kind != "fixed":
+                    goal, parts = sum(default) if values else start, [curve[:2] for curve in curves]
+                    if (default or not values) and (step["ramp"] or kind == "fixed"):  # displacements are ramps also where loads act at once
+                        parts.append((1, [(begin, 0.0 if curves else now), (end, goal)]))
+                        if not step["ramp"] and abs(goal - now) > 0:
+                            self.differs.setdefault(values[0].block.line, f"line {values[0].block.line}: *BOUNDARY without an amplitude is a ramp also here, as in Abaqus; CalculiX applies it at once")
+                    elif default or not values:
+                        parts.append((1, [(begin, goal)]))
+                    piece = summed(parts, begin, end)
+                    rest = piece[-1][1] - sum(factor * value_at(table, end, False) for factor, table in follow)
+            elif follow:
+                piece = summed([*follow, (rest, [(begin, 1.0)])], begin, end)
+            if piece:
+                same = abs(piece[0][1] - now) <= 1e-12 * max(abs(v) for _, v in (*piece, rows[-1]))
+                rows = [*(rows if begin else ()), *([(begin, now)] if begin > rows[-1][0] else ()), *(piece[1:] if same and begin else piece)]
+            begin = end
+        return tuple(bare(rows))
+
+    def lasting(self, specs):
+        """Lists what a support does that supports of a scene cannot."""
+        if specs[0].step > 1:
+            self.once(specs[0].block, "*BOUNDARY of what was free in the steps before", "supports last for the whole history: it holds 0 in those steps")
+        for k, g in enumerate(specs):
+            if g.value is None and not any(other.step == g.step for other in specs[k + 1:]):
+                self.once(g.block, "*BOUNDARY, OP=NEW", "a support that ends: supports last for the whole history")
+
+    def once(self, block, what, why):
+        if (what, why) not in self.left or self.left[what, why][0] is not block:
+            self.leave(block, what, why)
+
+    def gather(self, kind, word):
+        """Groups of what has one value at all times: those of the deck where they have, parts of them where steps divide them."""
+        given, courses, done = self.given[kind, word], {}, set()
+        for specs in {specs for specs in given.values() if specs}:
+            courses[specs] = self.course(kind, specs)
+        targets = [(name, axis, list(dict.fromkeys(members))) for name, axes in self.targets[kind, word].items() for axis, members in axes.items()]
+        for whole in (True, False):
+            for name, axis, members in targets:
+                found = {}
+                for n in members:
+                    if given[n, axis] and (whole or (n, axis) not in done):
+                        found.setdefault(courses[given[n, axis]], []).append(n)
+                mine = [n for of_one in found.values() for n in of_one]
+                divided = len(found) > 1 or len(mine) < len(members) or kind != "fixed" and any((n, axis) in done for n in mine)
+                if not whole or not divided and not done.issuperset((n, axis) for n in mine):
+                    for course, part in found.items():
+                        if kind != "traction" or any(v for _, v in course):
+                            self.enter(kind, self.group(kind, name, part, whole), axis, 1.0, course)
+                        done.update((n, axis) for n in part)
+        if kind == "fixed":
+            for specs in {given[n, axis] for name, axis, members in targets for n in members if given[n, axis]}:
+                self.lasting(specs)
+
+    def group(self, kind, name, members, whole):
+        """The name of the group of these nodes or faces: that of the deck, or a new one."""
+        place = {"fixed": "node_groups", "force": "point_groups"}.get(kind, "facet_groups")
+        known = self.kept[place].get(name)
+        if known is not None and set(known) != set(members) or not whole:
+            same = next((other for other, of in self.kept[place].items() if other.startswith(name) and set(of) == set(members)), None)
+            name = same or self.free_name(name + "_1", self.groups | set(self.bodies) | set(map(self.plain, self.deck.surfaces)))
+        self.kept[place][name] = members
+        self.groups.add(name)
+        return name
+
+    def enter(self, section, group, axis, factor, course):
+        """Adds a function of time to an entry of the scene."""
+        self.entry.setdefault("force" if section == "body force" else section, {}).setdefault(group, {}).setdefault(axis, []).append((factor, course))
+
+    def load_bodies(self):
+        """Gravity and rotation where they act on all bodies with a density, else forces of the bodies; other forces; temperatures."""
+        density = {t: self.materials.get(b[1], {}).get("density") for t, b in self.bodies.items()}
+        heavy = [t for t in self.bodies if density[t]] or list(self.bodies)
+        for kind in ("gravity", "body force"):
+            for (title, axis), specs in self.given.get((kind, "DLOAD"), {}).items():
+                course = self.course(kind, specs) if specs else ()
+                given = self.given[kind, "DLOAD"]
+                if not any(v for _, v in course) or kind == "gravity" and title not in heavy:
+                    continue
+                if kind == "gravity" and all(given.get((t, axis)) and self.course(kind, given[t, axis]) == course for t in heavy):
+                    if title == heavy[0]:
+                        self.enter("gravity", "", axis, 1.0, course)
+                else:
+                    self.enter("body force", title, axis, density[title] or 0.0 if kind == "gravity" else 1.0, course)
+        spins = {t: self.course("rotation", specs) for t, specs in self.given.get(("rotation", "DLOAD"), {}).items() if specs}
+        if spins:
+            if any(spins.get(t) != next(iter(spins.values())) for t in heavy):
+                last = next(specs for specs in self.given["rotation", "DLOAD"].values() if specs)[-1].block
+                self.leave(last, "*DLOAD, CENTRIF on some bodies", "all bodies with a density turn, as the first of these")
+            self.enter("rotation", "", "speed", 1.0, next(iter(spins.values())))
+        for title, specs in self.given.get(("temperature", "TEMPERATURE"), {}).items():
+            if specs:
+                self.enter("temperature", title, "", 1.0, self.course("temperature", specs, self.initial.get(title, 0.0)))
 
     # ------------------------------------------------------------------------------------------------ writing
 
@@ -513,32 +733,61 @@ class Draft:
         rest = [c for c in self.m.cells if c not in self.body_of]
         if rest:
             raise DeckError(f"{len(rest)} elements are in no *SOLID SECTION, the first is {rest[0]}")
+        self.steps = self.steps or [{"period": 1.0, "ramp": True, "creeps": False}]
+        for g in (g for given in self.given.values() for specs in given.values() for g in specs):
+            if g.amplitude and g.amplitude not in self.amplitudes:
+                raise DeckError(f"line {g.block.line}: *{g.block.word} names the amplitude {g.amplitude}, which is not there")
         for block, nodes, at, turn in self.rigids:
             self.hold(block, nodes, at, turn)
-        keep = {"facet_groups": {}, "node_groups": {}}
-        for kind, found in keep.items():
-            for name, members in getattr(self.m, kind).items():
-                if self.plain(name) in self.groups:
-                    found[self.plain(name)] = members
-            setattr(self.m, kind, found)
+        for name, (slave, master, interaction, *_) in list(self.contacts.items()):
+            if self.interactions.get(interaction, {}).get("tied"):  # the interaction may stand after the contact
+                self.ties[self.free_name(f"{slave}_{master}", self.ties)] = (slave, master, None)
+                del self.contacts[name]
+        for kind, word in self.targets:
+            self.gather(kind, word)
+        self.load_bodies()
+        self.soften()
+        for kind, groups in self.kept.items():
+            setattr(self.m, kind, groups)
         self.m.cell_groups = {title: keys for title, (keys, _, _) in self.bodies.items()}
 
     def hold(self, block, nodes, at, turn):
         """A rigid set whose reference point is held is one of prescribed nodes; else it has no counterpart."""
-        dim, given = self.dim(), self.reference.get(at, {})
-        own = {n: v for n, v in (self.reference.get(turn) or {}).items()}
-        turns = [own.get(k - 3) if turn is not None else given.get(k) for k in ((6,) if dim == 2 else (4, 5, 6))]
-        if any(d not in given for d in range(1, dim + 1)) or any(v is None or v[0] for v in turns):
+        dim, given = self.dim(), self.given.setdefault(("fixed", "BOUNDARY"), {})
+        moves = [given.get((at, axis)) for axis in AXES[:dim]]
+        turns = [given.get((at if turn is None else turn, d if turn is None else AXES[d - 4])) for d in ((6,) if dim == 2 else (4, 5, 6))]
+        if not all(moves) or not all(turns) or any(g.value not in (0.0, None, HELD) for specs in turns for g in specs):
             self.leave(block, f"*{block.word}", "only a rigid part whose reference point is held in all displacements and rotations (then: fixed); see contact type rigid for one under a load")
             return
-        if not any(n in self.used for n in nodes):
-            return  # rigid facets: their contacts are listed
+        for specs in turns:
+            self.lasting(specs)
+        mine = [n for n in nodes if n in self.used]
         name = self.free_name(f"rigid_{block.line}", self.groups)
-        self.m.node_groups[name] = [n for n in nodes if n in self.used]
-        self.groups.add(name)
-        for d in range(1, dim + 1):
-            value, source = given[d]
-            self.put(("fixed", name, AXES[d - 1]), value, source)
+        for axis, specs in zip(AXES, moves) if mine else ():  # rigid facets alone: their contacts are listed
+            given.update({(n, axis): specs for n in mine})
+            self.targets.setdefault(("fixed", "BOUNDARY"), {}).setdefault(name, {})[axis] = mine
+
+    def read_surface_behavior(self, interaction, block):
+        law = block.parameters.get("PRESSURE-OVERCLOSURE", "HARD").upper()
+        if law == "TIED":
+            interaction["tied"] = True
+        elif law == "LINEAR" and block.rows:
+            interaction["slope"] = (item(block.rows[0], 0), block)
+        elif law != "HARD":
+            self.leave(block, f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE={law}", "contact is hard")
+        if "NO SEPARATION" in block.parameters:
+            self.leave(block, "*SURFACE BEHAVIOR, NO SEPARATION", "contacts open; see tie in scenes.md")
+
+    def soften(self):
+        """Lists contact whose pressure rises so slowly with its overclosure that it is no penalty: not ten times as stiff as a body of the mesh's length."""
+        length = max(max(c) - min(c) for c in zip(*(self.m.nodes[n] for n in self.used)))
+        stiff = max((row[0] for m in self.materials.values() for row in m.get("elastic", ())), default=0.0)
+        for name in sorted({contact[2] for contact in self.contacts.values()}):
+            slope, block = self.interactions.get(name, {}).get("slope", (math.inf, None))
+            if slope * length < 10 * stiff:
+                self.leave(block, "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", "contact is hard")
+            elif block:
+                self.notes.append(f"line {block.line}: *SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR: taken as a penalty; contact is hard")
 
     def read_friction(self, interaction, block):
         """The coefficient of an interaction, of which other forms and changes within a step are left."""
@@ -557,45 +806,31 @@ class Draft:
         """Whether a contact of the draft has friction, which depends on the path: it needs a history."""
         return not self.frictionless and any(self.friction(contact[2]) > 0 for contact in self.contacts.values())
 
-    def inelastic(self):
-        return any("plastic" in m or "creep" in m for m in (self.materials.get(b[1], {}) for b in self.bodies.values()))
-
-    def expression(self, key):
-        """The value of a load or support, over time if the scene has a history."""
-        history = self.values[key]
-        start = self.initial.get(key[1], 0.0) if key[0] == "temperature" else 0.0
-        if not self.history:
-            step, value, amplitude = history[-1]
-            if amplitude in self.amplitudes:
-                value *= self.amplitudes[amplitude][0][-1][1]
-            return said(value)
-        rows, now, begin = [[0.0, start]], start, 0.0
-        for k, step in enumerate(self.steps, 1):
-            end = begin + step["period"]
-            for _, value, amplitude in [h for h in history if h[0] == k or (k == 1 and h[0] == 0)]:
-                if amplitude in self.amplitudes:
-                    table, total = self.amplitudes[amplitude]
-                    rows += [[t + (0 if total else begin), value * f] for t, f in table if t + (0 if total else begin) <= end * (1 + 1e-12)]
-                elif not step["ramp"] or step["kind"] == "VISCO" and key[0] != "temperature":
-                    rows += [[begin + 1e-6 * step["period"] if begin else 0.0, value]]
-                else:
-                    rows += [[begin, now], [end, value]]
-                now = rows[-1][1]
+    def creeps(self):
+        """The factor of the rate of creep over time, which is 0 in static steps, as rows; none if there is no creep."""
+        rows, begin = [], 0.0
+        for step in self.steps:
+            on, end = float(step["creeps"]), begin + step["period"]
+            rows += [(begin, on)] * (not rows or rows[-1][1] != on) + [(end, on)]
             begin = end
-        table = {}
-        for t, v in rows:
-            table[round(t, 12)] = v
-        table = sorted(table.items())
-        if len({v for _, v in table}) == 1:
-            return said(table[0][1])
-        scale = max((abs(v) for _, v in table), default=0)
-        if key[0] == "temperature":
-            scale = 1
-        shape = tuple((t, v / scale) for t, v in table)
-        if shape[-1][1] < 0 and scale != 1:
-            shape, scale = tuple((t, -v) for t, v in shape), -scale
-        name = self.tables.setdefault(shape, f"{'heat' if key[0] == 'temperature' else 'ramp'}{len(self.tables) + 1}")
-        return product(scale, name)
+        return rows if any(on for _, on in rows) else []
+
+    def inelastic(self):
+        return any("plastic" in m or "creep" in m and self.creeps() for m in (self.materials.get(b[1], {}) for b in self.bodies.values()))
+
+    def over_time(self, parts, kind="ramp"):
+        """The sum of functions of time (factor, rows) as text: numbers, and in a history factors of its tables."""
+        out = ""
+        for factor, rows in parts:
+            rows = steep(rows) if self.history else rows[-1:]
+            if len({v for _, v in rows}) == 1:
+                text = said(factor * rows[0][1])
+            else:
+                scale = max((v for _, v in rows), key=abs) if kind == "ramp" else 1.0
+                shape = tuple((moment(t), said(v / scale)) for t, v in rows)
+                text = product(factor * scale, self.tables.setdefault(shape, f"{kind}{len(self.tables) + 1}"))
+            out += text if not out or text.startswith("-") else "+" + text
+        return out
 
     def material(self, title):
         """The entries of a body: {name: text}."""
@@ -605,7 +840,8 @@ class Draft:
             self.leave(block, f"material {name or '(none)'} of {title}", "it has no isotropic *ELASTIC: give young and poisson in the draft")
             m = m or {}
         rows = m.get("elastic", [(1.0, 0.0, 0.0)])
-        hot = ("temperature", title, "") in self.values or title in self.initial
+        heat = self.entry.get("temperature", {}).get(title)
+        hot = heat or title in self.initial
         out["young"] = piecewise([(e, t) for e, _, t in rows], "temperature") if hot else said(rows[0][0])
         out["poisson"] = piecewise([(n, t) for _, n, t in rows], "temperature") if hot else said(rows[0][1])
         if len(rows) > 1 and not hot:
@@ -613,7 +849,7 @@ class Draft:
         if "density" in m:
             out["density"] = said(m["density"])
         if hot and ("expansion" in m or len(rows) > 1):
-            out["temperature"] = self.expression(("temperature", title, "")) if ("temperature", title, "") in self.values else said(self.initial[title])
+            out["temperature"] = self.over_time(heat[""], "heat") if heat else said(self.initial[title])
         if "expansion" in m and "temperature" in out:
             alpha, zero, source = m["expansion"]
             start = self.initial.get(title, 0.0)
@@ -621,18 +857,23 @@ class Draft:
             out["reference_temperature"] = said(start if len(alpha) == 1 else zero)
             if len(alpha) > 1 and start != zero:
                 self.leave(source, "*EXPANSION that depends on the temperature, from an initial one that is not ZERO", "subtract its strain at the initial temperature")
-        if "creep" in m:
+        creeps = "creep" in m and self.creeps()
+        if creeps:
             a, n, power = m["creep"]
             out["law"] = "strain_hardening" if power else "norton"
-            out.update(rate=said(a / (1 + power)), exponent=said(n), **({"time_exponent": said(1 + power)} if power else {}))
+            out.update(rate=self.over_time([(a / (1 + power), creeps)], "creep"), exponent=said(n), **({"time_exponent": said(1 + power)} if power else {}))
         if "plastic" in m:
             rows = m["plastic"]
-            out["law"] = "norton" if "creep" in m else "j2"
+            out["law"] = "norton" if creeps else "j2"
             out["yield"] = said(rows[0][0])
             if len(rows) > 1:
                 out["hardening"] = said((rows[-1][0] - rows[0][0]) / (rows[-1][1] - rows[0][1]))
-        if "law" in out and any(self.m.cells[c][0] in ("tri3", "tet4") for c in self.bodies[title][0]):
+        kinds = {self.m.cells[c][0] for c in self.bodies[title][0]}
+        if "law" in out and kinds & {"tri3", "tet4"}:
             out["element"] = "standard"
+        elif "law" not in out and max(n for _, n, _ in rows) > 0.49 and kinds <= {"quad4", "hex8"} and self.formulation() != "plane_stress":
+            out["element"] = "bbar"
+            self.notes.append(f"line {block.line}: {title}: nearly incompressible: its cells do not lock, as those of Abaqus; CalculiX's do (element: standard)")
         return out
 
     def reach(self, slave, master):
@@ -664,19 +905,19 @@ class Draft:
 
     def entries(self):
         """The sections of the scene: [(section, [(key, text, comment)])]."""
-        groups = {}
-        for key in self.values:
-            groups.setdefault(key[0], {}).setdefault(key[1], []).append(key)
+        def axes(kind):
+            return {group: "{" + ", ".join(f"{axis}: {quoted(self.over_time(parts))}" for axis, parts in of.items()) + "}" for group, of in self.entry.get(kind, {}).items()}
+
         yield "body", [(t, "{" + ", ".join(f"{k}: {quoted(v)}" for k, v in self.material(t).items()) + "}", "") for t in self.bodies]
         for kind in ("fixed", "force", "traction"):
-            yield kind, [(g, "{" + ", ".join(f"{k[2]}: {quoted(self.expression(k))}" for k in keys) + "}", "") for g, keys in groups.get(kind, {}).items()]
-        yield "pressure", [(g, quoted(self.expression(keys[0])), "") for g, keys in groups.get("pressure", {}).items()]
-        if "gravity" in groups:
-            yield "gravity", [(k[2], quoted(self.expression(k)), "") for k in groups["gravity"][""]]
-        if "rotation" in groups:
+            yield kind, [(group, text, "") for group, text in axes(kind).items()]
+        yield "pressure", [(group, quoted(self.over_time(of[""])), "") for group, of in self.entry.get("pressure", {}).items()]
+        yield "gravity", [(axis, quoted(self.over_time(parts)), "") for axis, parts in self.entry.get("gravity", {}).get("", {}).items()]
+        if "rotation" in self.entry:
             more = [("axis", "{" + ", ".join(f"{a}: {said(v)}" for a, v in zip(AXES, self.axis[1])) + "}", ""),
                     ("through", "{" + ", ".join(f"{a}: {said(v)}" for a, v in zip(AXES, self.axis[0])) + "}", "")] if self.dim() == 3 else []
-            yield "rotation", [("speed", quoted(self.expression(groups["rotation"][""][0])), ""), *more]
+            square = self.over_time(self.entry["rotation"][""]["speed"])
+            yield "rotation", [("speed", quoted(f"sqrt({square})" if re.search("[a-z]", square) else said(math.sqrt(max(float(square), 0)))), ""), *more]
         yield "tie", [(name, f"{{slave: {s}, master: {m}" + (f", tolerance: {said(t)}" if t else "") + "}", "") for name, (s, m, t) in self.ties.items()]
         yield "contact", [self.contact(name) for name in self.contacts]
 
@@ -703,7 +944,10 @@ class Draft:
         self.history = self.inelastic() or self.rubs() or len(self.steps) > 1
         if self.rubs():
             self.notes.append("friction is solved at full order and by models of bodies, with *TIE by hybrid models; --frictionless leaves it out. More listed times follow its path more closely.")
-        self.steps = self.steps or [{"period": 1.0, "kind": "", "ramp": True}]
+        creep = next((b for b in self.deck.rest if b.word == "CREEP"), None)
+        if creep and not all(step["creeps"] for step in self.steps):
+            self.notes.append(f"line {creep.line}: *CREEP acts in *VISCO steps alone" + (": its rate is 0 in the others" if self.creeps() else ", of which there is none: it is left out"))
+        self.notes += self.differs.values()
         sections = list(self.entries())
         lines = [f"# Draft from {self.name}. Displacements are small; bodies are in the deck's units.",
                  "# For a model, name what varies: `parameters: [p]` under scene, `parameter: {p: {range: [LOW, HIGH]}}`, and p in any value."]
@@ -731,8 +975,8 @@ class Draft:
             for step in self.steps:
                 t += step["period"]
                 times.append(t)
-            lines += ["history:", "  times: [" + ", ".join(said(t) for t in times) + "]"]
+            lines += ["history:", "  times: [" + ", ".join(moment(t) for t in times) + "]"]
             if self.tables:
                 lines.append("  tables:")
-                lines += [f"    {name}: [" + ", ".join(f"[{said(t)}, {said(v)}]" for t, v in shape) + "]" for shape, name in self.tables.items()]
+                lines += [f"    {name}: [" + ", ".join(f"[{t}, {v}]" for t, v in shape) + "]" for shape, name in self.tables.items()]
         return "\n".join(lines) + "\n"
