@@ -18,7 +18,9 @@ static const PetscReal VALUES[2] = {3, 5}, SAMPLES[2] = {93, 273}, OF_TURNS[2] =
 #define INNER_TABLE 6e6
 #define TURNS       3
 
-/* Solves with sparse factors, dense products on narrow matrices, and decompositions, relative to a product of large ones. */
+/* Solves with sparse factors, dense products on narrow matrices, and decompositions, relative to a product of large ones; a prediction, relative
+   to a product with a vector. */
+#define ONLINE_SHARE 0.65
 #define SOLVE_SHARE  0.12
 #define NARROW_SHARE 0.25
 #define POD_SHARE    0.12
@@ -85,10 +87,10 @@ static void AddBody(const HycoInspection *in, PetscReal ns, PetscReal share, Pet
   *prediction += ACTIVE * ns * ns * (values > 1 ? values : 1) + 2 * ACTIVE * ns * (modes + inner) * values;
 }
 
-/* The costs of a model of bodies: in->body_values values of the parameters that change a body, 0: no such model. speed:
-   of products a second, on each rank. Collective. */
-PetscErrorCode HycoInspectBodyCost(HycoFOM f, const HycoBodyParts *parts, const PetscReal mu[], PetscReal speed,
-                                   HycoInspection *in)
+/* The costs of a model of bodies: in->body_values values of the parameters that change a body, 0: no such model.
+   Collective. */
+PetscErrorCode HycoInspectBodyCost(HycoFOM f, const HycoBodyParts *parts, const PetscReal mu[],
+                                   const PetscReal speed[2], HycoInspection *in)
 {
   PetscInt shape[HYCO_MAX_PARAMETERS];
   const PetscInt n_theta = HycoBodyPartsShapes(parts, -1, shape);
@@ -112,16 +114,15 @@ PetscErrorCode HycoInspectBodyCost(HycoFOM f, const HycoBodyParts *parts, const 
       const PetscReal values = PetscMin(PetscPowReal(VALUES[end], (PetscReal)axes), MOST_VALUES);
 
       AddBody(in, PetscMax(ns / parts->n, 1), 1. / (PetscReal)parts->n, axes, values, turned[b],
-              samples * (n_theta ? SPREAD : 1), speed, &training, &prediction);
+              samples * (n_theta ? SPREAD : 1), speed[0], &training, &prediction);
     }
     /* W and its factor, twice for contacts that join; the search; parameters, loads and outputs. */
     prediction += 2 * (ENTRIES * active * ns + active * active * active / 3) + 2e4 * (PetscReal)f->n_contacts + 4e5;
-    training += samples * prediction / NARROW_SHARE;
+    in->body_prediction = prediction / (ONLINE_SHARE * speed[1]);
     in->body_values = (PetscInt)PetscMin(PetscPowReal(VALUES[end], (PetscReal)n_theta), MOST_VALUES);
-    in->body_training[end] =
-        (training / (speed * f->size) + START + (HELD + (n_theta ? in->body_values + 2 * n_theta : 0)) * in->first) *
-        (end ? MARGIN : 1 / MARGIN);
-    in->body_prediction = prediction / (NARROW_SHARE * speed);
+    in->body_training[end] = ((training / speed[0] + samples * in->body_prediction) / f->size + START +
+                              (HELD + (n_theta ? in->body_values + 2 * n_theta : 0)) * in->first) *
+                             (end ? MARGIN : 1 / MARGIN);
   }
   PetscCall(PetscFree(turned));
   PetscFunctionReturn(PETSC_SUCCESS);

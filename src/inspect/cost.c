@@ -22,24 +22,28 @@ static PetscErrorCode Resident(MPI_Comm comm, PetscReal *bytes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Floating-point operations per second of a small matrix product on this process. A peak of which a sparse
-   factorisation reaches the share SPARSE_SHARE. */
-static PetscErrorCode Speed(PetscReal *flops)
+/* Floating-point operations per second on this process. of[0]: a small matrix product; a peak of which a sparse factorisation
+   reaches the share SPARSE_SHARE. of[1]: a matrix times a vector, which memory bounds, and hardly the kernels of BLAS. */
+static PetscErrorCode Speed(PetscReal of[2])
 {
-  const PetscBLASInt n = 256;
+  const PetscBLASInt n = 256, m = 700, step = 1;
   const PetscScalar one = 1, zero = 0;
   PetscScalar *a;
   clock_t begin;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(3 * n * n, &a));
-  for (PetscInt k = 0; k < 3 * n * n; k++) a[k] = 1;
+  PetscCall(PetscMalloc1(m * (m + 2), &a));
+  for (PetscInt k = 0; k < m * (m + 2); k++) a[k] = 1;
   /* The first product also loads the kernels: the maximum leaves it out. */
-  *flops = 0;
+  of[0] = of[1] = 0;
   for (PetscInt k = 0; k < 10; k++) { /* the fastest, in CPU time, because others may use the machine */
     begin = clock();
     BLASgemm_("N", "N", &n, &n, &n, &one, a, &n, a + n * n, &n, &zero, a + 2 * n * n, &n);
-    *flops = PetscMax(*flops, 2. * n * n * n * CLOCKS_PER_SEC / PetscMax((PetscReal)(clock() - begin), 1));
+    of[0] = PetscMax(of[0], 2. * n * n * n * CLOCKS_PER_SEC / PetscMax((PetscReal)(clock() - begin), 1));
+    begin = clock();
+    for (PetscInt j = 0; j < 4; j++)
+      BLASgemv_("N", &m, &m, &one, a, &m, a + m * m, &step, &zero, a + m * (m + 1), &step);
+    of[1] = PetscMax(of[1], 8. * m * m * CLOCKS_PER_SEC / PetscMax((PetscReal)(clock() - begin), 1));
   }
   PetscCall(PetscFree(a));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -47,7 +51,7 @@ static PetscErrorCode Speed(PetscReal *flops)
 
 /* Only the symbolic analysis is done: MUMPS then knows the size of the factor and the operations, and nothing of
    that size is allocated. */
-PetscErrorCode HycoInspectCost(HycoFOM f, PetscReal assembly, HycoInspection *in, PetscReal *speed)
+PetscErrorCode HycoInspectCost(HycoFOM f, PetscReal assembly, HycoInspection *in, PetscReal speed[2])
 {
   HycoDirect probe;
   PetscReal begin = HycoNow();
@@ -60,8 +64,8 @@ PetscErrorCode HycoInspectCost(HycoFOM f, PetscReal assembly, HycoInspection *in
                               &in->bytes));
   begin = HycoNow() - begin;
   PetscCall(Speed(speed));
-  in->first = assembly + begin + HycoDirectOperations(probe) / (SPARSE_SHARE * *speed * f->size);
-  in->next = 20 * in->bytes / 8 / (SPARSE_SHARE * *speed * f->size); /* a few products with the factor */
+  in->first = assembly + begin + HycoDirectOperations(probe) / (SPARSE_SHARE * speed[0] * f->size);
+  in->next = 20 * in->bytes / 8 / (SPARSE_SHARE * speed[0] * f->size); /* a few products with the factor */
   PetscCall(HycoDirectDestroy(&probe));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

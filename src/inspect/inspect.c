@@ -178,7 +178,7 @@ static PetscErrorCode Describe(HycoInspection *in)
 
 /* How the parameters enter the bodies, with changes from the point mu; of scenes with contact. With a history only what does
    not depend on time. Collective. */
-static PetscErrorCode DescribeBodies(HycoFOM f, const PetscReal mu[], PetscReal speed, HycoInspection *in)
+static PetscErrorCode DescribeBodies(HycoFOM f, const PetscReal mu[], const PetscReal speed[2], HycoInspection *in)
 {
   const HycoScene s = f->scene;
   HycoBodyParts parts;
@@ -198,7 +198,7 @@ static PetscErrorCode DescribeBodies(HycoFOM f, const PetscReal mu[], PetscReal 
 static PetscErrorCode Visit(HycoFOM f, HycoInspection *in)
 {
   const PetscInt p = f->scene->n_parameters;
-  PetscReal *mu, begin, speed;
+  PetscReal *mu, begin, speed[2];
 
   PetscFunctionBegin;
   PetscCall(ListPoints(f->scene, &in->n_points, &mu));
@@ -207,7 +207,7 @@ static PetscErrorCode Visit(HycoFOM f, HycoInspection *in)
   PetscCall(InspectPoint(f, in, mu, (PetscBool)(in->n_points == 1)));
   begin = HycoNow() - begin;
   /* The centre's assembly is timed, which is the last: the others have warmed up caches. */
-  PetscCall(HycoInspectCost(f, begin, in, &speed));
+  PetscCall(HycoInspectCost(f, begin, in, speed));
   HycoOnRoot(HycoComm(f), Describe(in));
   PetscCall(DescribeBodies(f, mu, speed, in));
   PetscCall(PetscFree(mu));

@@ -28,12 +28,12 @@ PetscErrorCode HycoInspectVariables(HycoInspection *in);
 
 /* For the assembled system, which took `assembly` seconds: the factor's memory by MUMPS's analysis of the stiffness
    with the contacts, seconds from its count of operations. Collective. */
-PetscErrorCode HycoInspectCost(HycoFOM fom, PetscReal assembly, HycoInspection *in, PetscReal *speed);
+PetscErrorCode HycoInspectCost(HycoFOM fom, PetscReal assembly, HycoInspection *in, PetscReal speed[2]);
 
 /* -- body_cost.c -- */
 
-/* speed: the operations of a product in a second on this rank, of HycoInspectCost(). Collective. */
-PetscErrorCode HycoInspectBodyCost(HycoFOM fom, const HycoBodyParts *parts, const PetscReal mu[], PetscReal speed,
-                                   HycoInspection *in);
+/* speed: those of HycoInspectCost(). Collective. */
+PetscErrorCode HycoInspectBodyCost(HycoFOM fom, const HycoBodyParts *parts, const PetscReal mu[],
+                                   const PetscReal speed[2], HycoInspection *in);
 
 #endif
