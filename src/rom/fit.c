@@ -15,14 +15,15 @@
 #define SAME       1e-4 /* relative difference of misfits that are one minimum's */
 #define STALLED    10   /* iterations in which a misfit that does not fall by SAME ends */
 #define ITERATIONS 200
+#define SEARCH     "10" /* predictions of a line search */
 #define INSIDE     1e-4 /* share of half the ranges */
 #define LEFT       1e-6 /* share of a parameter's derivatives that is left beside the others' and is not round-off */
 
 typedef struct {
   HycoROM model;
   PetscInt n, n_par;
-  PetscReal earlier;      /* the misfit some iterations before */
-  const PetscInt *output; /* by target: its output */
+  PetscReal last, earlier; /* the misfit an iteration before, and some iterations before */
+  const PetscInt *output;  /* by target: its output */
   const PetscReal *target;
   PetscReal scale[HYCO_MAX_QUANTITIES];
   PetscReal lo[HYCO_MAX_PARAMETERS], hi[HYCO_MAX_PARAMETERS]; /* of a held parameter both are its value */
@@ -272,6 +273,7 @@ static PetscBool IsMinimum(const Fit *f, PetscReal tolerance)
 static PetscErrorCode Ends(Tao tao, void *ctx)
 {
   Fit *f = (Fit *)ctx;
+  PetscReal size;
   PetscInt k;
   Vec X;
 
@@ -279,12 +281,30 @@ static PetscErrorCode Ends(Tao tao, void *ctx)
   PetscCall(TaoGetSolution(tao, &X));
   PetscCall(EvaluateVec(f, X));
   PetscCall(TaoGetIterationNumber(tao, &k));
-  if (k % STALLED == 0) {
-    if (k && Size(f->n, f->r) > (1 - SAME) * f->earlier) PetscCall(TaoSetConvergedReason(tao, TAO_CONVERGED_USER));
-    f->earlier = Size(f->n, f->r);
-  }
+  size = Size(f->n, f->r);
+  if (k && (size > (1 - EXACT) * f->last || (k % STALLED == 0 && size > (1 - SAME) * f->earlier)))
+    PetscCall(TaoSetConvergedReason(tao, TAO_CONVERGED_USER));
+  f->last = size;
+  if (k % STALLED == 0) f->earlier = size;
   if (IsMinimum(f, MINIMUM / 100)) PetscCall(TaoSetConvergedReason(tao, TAO_CONVERGED_GATOL));
   if (k >= ITERATIONS) PetscCall(TaoSetConvergedReason(tao, TAO_DIVERGED_MAXITS));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* TAO's own limit is 30 predictions with gradients, which a search that ends at a kink takes; there is no function for it. */
+static PetscErrorCode LimitSearch(Tao tao)
+{
+  TaoLineSearch search;
+  PetscOptions options;
+
+  PetscFunctionBegin;
+  PetscCall(TaoGetLineSearch(tao, &search));
+  PetscCall(PetscOptionsCreate(&options));
+  PetscCall(PetscOptionsSetValue(options, "-tao_ls_max_funcs", SEARCH));
+  PetscCall(PetscObjectSetOptions((PetscObject)search, options));
+  PetscCall(TaoLineSearchSetFromOptions(search));
+  PetscCall(PetscObjectSetOptions((PetscObject)search, NULL));
+  PetscCall(PetscOptionsDestroy(&options));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -317,6 +337,7 @@ static PetscErrorCode Minimise(Fit *f, const char type[], Vec X)
   inner = tao;
   if (squares) PetscCall(TaoBRGNGetSubsolver(tao, &inner));
   PetscCall(TaoSetConvergenceTest(inner, Ends, f));
+  PetscCall(LimitSearch(inner));
   PetscCall(TaoSolve(tao));
   HycoDestroyAll(&tao, &J, &r, &lo, &hi);
   PetscFunctionReturn(PETSC_SUCCESS);
