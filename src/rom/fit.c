@@ -13,7 +13,7 @@
 #define MINIMUM    1e-5 /* of the slope of the misfit, relative to what the derivatives allow */
 #define WEIGHT     1e-6 /* of the regularisation of Gauss-Newton steps: for targets that do not determine all parameters */
 #define SAME       1e-4 /* relative difference of misfits that are one minimum's */
-#define STALLED    10   /* iterations in which a misfit that does not fall by SAME ends */
+#define STALLED    5    /* iterations in which a misfit that does not fall by SAME ends */
 #define ITERATIONS 200
 #define SEARCH     "10" /* predictions of a line search */
 #define INSIDE     1e-4 /* share of half the ranges */
@@ -22,8 +22,8 @@
 typedef struct {
   HycoROM model;
   PetscInt n, n_par;
-  PetscReal last, earlier; /* the misfit an iteration before, and some iterations before */
-  const PetscInt *output;  /* by target: its output */
+  PetscReal earlier;      /* the misfit some iterations before */
+  const PetscInt *output; /* by target: its output */
   const PetscReal *target;
   PetscReal scale[HYCO_MAX_QUANTITIES];
   PetscReal lo[HYCO_MAX_PARAMETERS], hi[HYCO_MAX_PARAMETERS]; /* of a held parameter both are its value */
@@ -282,10 +282,10 @@ static PetscErrorCode Ends(Tao tao, void *ctx)
   PetscCall(EvaluateVec(f, X));
   PetscCall(TaoGetIterationNumber(tao, &k));
   size = Size(f->n, f->r);
-  if (k && (size > (1 - EXACT) * f->last || (k % STALLED == 0 && size > (1 - SAME) * f->earlier)))
-    PetscCall(TaoSetConvergedReason(tao, TAO_CONVERGED_USER));
-  f->last = size;
-  if (k % STALLED == 0) f->earlier = size;
+  if (k % STALLED == 0) {
+    if (k && size > (1 - SAME) * f->earlier) PetscCall(TaoSetConvergedReason(tao, TAO_CONVERGED_USER));
+    f->earlier = size;
+  }
   if (IsMinimum(f, MINIMUM / 100)) PetscCall(TaoSetConvergedReason(tao, TAO_CONVERGED_GATOL));
   if (k >= ITERATIONS) PetscCall(TaoSetConvergedReason(tao, TAO_DIVERGED_MAXITS));
   PetscFunctionReturn(PETSC_SUCCESS);
