@@ -385,7 +385,22 @@ static void ByData(const HycoFlowRule *rule, const HycoFlowPoint *p, const HycoM
 typedef struct {
   Work w;
   PetscReal creep, plastic, q, slope, yield, hardening, G, bulk; /* slope: of creep by q; yield < 0: none */
+  PetscBool yields;                                              /* the equations are those of yielding */
 } Solved;
+
+/* As the step has decided: on the border, where the plastic strain is round-off, by the solution for creep alone again. */
+static PetscBool Yields(const HycoFlowRule *rule, Solved *s)
+{
+  PetscReal before, hardening;
+  Work w = s->w;
+
+  if (!rule->yield || !(w.trial > 0)) return PETSC_FALSE;
+  before = (*rule->yield)(&w.p, w.p.plastic0, &hardening);
+  if (before < 0 || s->plastic > 0 || s->q < (1 - BORDER) * before) return (PetscBool)(before >= 0 && s->plastic > 0);
+  StartCreep(rule, &w);
+  while (!w.done) IterateCreep(rule, &w);
+  return (PetscBool)(w.q > before);
+}
 
 static void TakeSolved(const HycoFlowRule *rule, const HycoMaterialPoints *m, PetscInt i, Solved *s)
 {
@@ -407,6 +422,7 @@ static void TakeSolved(const HycoFlowRule *rule, const HycoMaterialPoints *m, Pe
   /* At rest: whether creep begins in proportion to the stress. */
   if (rule->creep && s->w.p.dt > 0) (void)(*rule->creep)(&s->w.p, s->w.trial > 0 ? s->q : REST, &s->slope);
   if (rule->yield) s->yield = (*rule->yield)(&s->w.p, state[ns + 1], &s->hardening);
+  s->yields = Yields(rule, s);
 }
 
 /* Along direction d: the derivatives of q + H (creep + plastic) = q_tr, and of q = Y where plastic strain flows. */
@@ -448,7 +464,7 @@ static void Slope(const HycoFlowRule *rule, const HycoMaterialPoints *m, PetscIn
     d->apart = PetscMax(d->apart, PetscAbsReal(dev[c]));
   trial = s->w.trial > 0 ? (ns == 1 ? 1 : 1.5) * trial / s->w.trial : 0;
   ByData(rule, &s->w.p, d, i, dstate0[ns], s->q, m->state[i * (ns + 2) + ns + 1], &by_creep, &by_yield);
-  if (s->plastic > 0) {
+  if (s->yields) {
     dq = s->hardening * (dstate0[ns + 1] + (trial - dp * dH) / H - by_creep) + by_yield;
     dq /= 1 + s->hardening * (1 / H + s->slope);
     creep = s->slope * dq + by_creep;
@@ -459,9 +475,9 @@ static void Slope(const HycoFlowRule *rule, const HycoMaterialPoints *m, PetscIn
   }
   d->rate = PetscMax(d->rate, PetscMax(PetscAbsReal(trial), PetscAbsReal(dq)));
   /* On the yield surface the point stays there, or its derivatives differ between the two sides. */
-  if (s->yield >= 0 && s->plastic > 0 && H * s->plastic <= BORDER * s->yield)
+  if (s->yields && H * s->plastic <= BORDER * s->yield)
     d->apart = PetscMax(d->apart, H * PetscAbsReal(plastic));
-  else if (s->yield >= 0 && !(s->plastic > 0) && s->q >= (1 - BORDER) * s->yield)
+  else if (!s->yields && s->yield >= 0 && s->q >= (1 - BORDER) * s->yield)
     d->apart = PetscMax(d->apart, PetscAbsReal(dq - s->hardening * dstate0[ns + 1] - by_yield));
   unit = s->w.trial > 0 ? (ns == 1 ? 1.0 : 1.5) / s->w.trial : 0;
   turn = ns == 1 ? 0 : dp * unit;
