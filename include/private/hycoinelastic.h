@@ -142,8 +142,8 @@ PetscErrorCode HycoFEStepPoints(HycoFE fe, PetscInt n, const PetscInt point[], c
   Laws at some points (of bodies whose laws have `slopes`) along known displacements, with the derivatives of their states by
   n_slopes parameters. HycoFEPointsBegin(): the initial state. HycoFEPointsStep(): from the accepted state to u (n_dof) at
   t1, at fe's parameters; s and C - C_t as HycoFEStepPoints() (NULL: not wanted). HycoFEPointsBeside(): keeps the data at
-  fe's present parameters, and the strains of u there, as those of point 1 to 4 of a difference (u NULL: they are those of the
-  step). HycoFEPointsSlope(): the state's derivative by parameter k, du with displacements (n_dof); ds, dstress:
+  fe's present parameters, and the strains of u there (NULL: those of the step), as those of point 1 to 4 of a difference;
+  changes false: all is as in the step. HycoFEPointsSlope(): the state's derivative by parameter k, du with displacements (n_dof); ds, dstress:
   n x n_sigma, or NULL; *smooth: false: a point leaves its yield surface. HycoFEPointsAccept(): the step's state becomes the
   accepted one. Stress and weights of the step are borrowed. Not collective.
 */
@@ -154,9 +154,9 @@ PetscErrorCode HycoFEPointsDestroy(HycoFEPoints *points);
 PetscErrorCode HycoFEPointsBegin(HycoFEPoints points);
 PetscErrorCode HycoFEPointsStep(HycoFEPoints points, const PetscReal u[], PetscReal t0, PetscReal t1, PetscReal s[],
                                 PetscReal lost[]);
-/* Whether parameters change the laws' data, or the strains of the same free displacements. */
-PetscBool HycoFEPointsChange(HycoFEPoints points, const PetscBool changed[]);
-PetscErrorCode HycoFEPointsBeside(HycoFEPoints points, PetscInt id, const PetscReal u[]);
+/* Whether parameters change the laws' data; *strains: also the strains of the same free displacements. */
+PetscBool HycoFEPointsChange(HycoFEPoints points, const PetscBool changed[], PetscBool *strains);
+PetscErrorCode HycoFEPointsBeside(HycoFEPoints points, PetscInt id, PetscBool changes, const PetscReal u[]);
 PetscErrorCode HycoFEPointsSlope(HycoFEPoints points, PetscInt k, const PetscReal weight[3], const PetscInt id[3],
                                  const PetscReal du[], PetscReal ds[], PetscReal dstress[], PetscBool *smooth);
 PetscErrorCode HycoFEPointsAccept(HycoFEPoints points);

@@ -10,7 +10,8 @@
 
 /* The data at a point of the parameters. */
 typedef struct {
-  PetscBool there;
+  PetscBool there, strained; /* strained: with strains, weights and places of its own */
+  PetscInt place;            /* of x, a number of fe's; 0: none yet */
   PetscReal *x, *temperature, *thermal, *strain, *weight, *memory; /* memory: of the constants, by run */
 } Data;
 
@@ -144,7 +145,7 @@ static PetscErrorCode Strains(HycoFEPoints p, const PetscReal u[], PetscReal str
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* constant: by run, HYCO_MAX_DECLARED. */
+/* u NULL: strains and places are those of the step. constant: by run, HYCO_MAX_DECLARED. */
 static PetscErrorCode TakeData(HycoFEPoints p, const PetscReal u[], Data *d, const PetscReal *constant[])
 {
   HycoFE fe = p->fe;
@@ -152,11 +153,18 @@ static PetscErrorCode TakeData(HycoFEPoints p, const PetscReal u[], Data *d, con
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < p->n; i++) {
-    HycoPointPlace(fe, el, p->point[i] / el->nq, p->point[i] % el->nq, d->x + 3 * i);
+    if (u && d->place != fe->place) HycoPointPlace(fe, el, p->point[i] / el->nq, p->point[i] % el->nq, d->x + 3 * i);
     if (fe->temperature) d->temperature[i] = fe->temperature[p->point[i]];
     if (fe->thermal) d->thermal[i] = fe->thermal[p->point[i]];
   }
-  PetscCall(Strains(p, u, d->strain, d->weight));
+  if (u) d->place = fe->place;
+  if (u)
+    PetscCall(Strains(p, u, d->strain, d->weight));
+  else {
+    d->place = p->data[0].place;
+    PetscCall(PetscArraycpy(d->x, p->data[0].x, 3 * p->n));
+  }
+  d->strained = (PetscBool)(u != NULL);
   for (PetscInt r = 0; r < p->n_runs; r++) {
     const HycoMaterial law = LawOf(p, r);
 
@@ -227,12 +235,13 @@ const PetscReal *HycoFEPointsWeights(HycoFEPoints p)
   return p->data[0].weight;
 }
 
-PetscBool HycoFEPointsChange(HycoFEPoints p, const PetscBool changed[])
+PetscBool HycoFEPointsChange(HycoFEPoints p, const PetscBool changed[], PetscBool *strains)
 {
   const HycoScene s = p->fe->scene;
   const HycoChanges c = HycoSceneChanges(s, changed);
 
-  if (c.nodes || HycoSceneSupportsChange(s, p->fe->mesh, changed, c.nodes)) return PETSC_TRUE;
+  *strains = (PetscBool)(c.nodes || HycoSceneSupportsChange(s, p->fe->mesh, changed, c.nodes));
+  if (*strains) return PETSC_TRUE;
   for (PetscInt r = 0; r < p->n_runs; r++) {
     const HycoBody *body =
         &s->body[p->fe->mesh->cell_body[p->point[p->run[r]] / HycoElementGet(p->fe->mesh->type)->nq]];
@@ -245,13 +254,13 @@ PetscBool HycoFEPointsChange(HycoFEPoints p, const PetscBool changed[])
 }
 
 /* At fe's parameters, which are not those of the step. */
-PetscErrorCode HycoFEPointsBeside(HycoFEPoints p, PetscInt id, const PetscReal u[])
+PetscErrorCode HycoFEPointsBeside(HycoFEPoints p, PetscInt id, PetscBool changes, const PetscReal u[])
 {
   const PetscReal **constant;
 
   PetscFunctionBegin;
   p->data[id].there = PETSC_FALSE;
-  if (!u) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!changes) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(p->n_runs * HYCO_MAX_DECLARED + 1, &constant));
   HycoFinally(TakeData(p, u, &p->data[id], constant), PetscCall(PetscFree(constant)));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -267,16 +276,21 @@ static PetscBool Moves(HycoFEPoints p, const PetscInt id[3])
   return (PetscBool)(p->data[id[1]].there || p->data[id[2]].there);
 }
 
+static PetscBool Strained(HycoFEPoints p, const PetscInt id[3])
+{
+  return (PetscBool)(Moves(p, id) && p->data[id[1]].strained && p->data[id[2]].strained);
+}
+
 void HycoFEPointsWeightSlope(HycoFEPoints p, const PetscReal weight[3], const PetscInt id[3], PetscReal slope[])
 {
-  for (PetscInt i = 0; i < p->n; i++) slope[i] = Moves(p, id) ? SUM(p, id, weight, weight, i) : 0;
+  for (PetscInt i = 0; i < p->n; i++) slope[i] = Strained(p, id) ? SUM(p, id, weight, weight, i) : 0;
 }
 
 PetscErrorCode HycoFEPointsSlope(HycoFEPoints p, PetscInt k, const PetscReal weight[3], const PetscInt id[3],
                                  const PetscReal du[], PetscReal ds[], PetscReal dstress[], PetscBool *smooth)
 {
   const PetscInt ns = p->fe->n_sigma;
-  const PetscBool moves = Moves(p, id);
+  const PetscBool moves = Moves(p, id), strained = Strained(p, id);
   PetscReal *lost = ds ? ds : p->by_lost, *stress = dstress ? dstress : p->by_stress, rate = 0, apart = 0;
 
   PetscFunctionBegin;
@@ -284,7 +298,7 @@ PetscErrorCode HycoFEPointsSlope(HycoFEPoints p, PetscInt k, const PetscReal wei
   for (PetscInt i = 0; i < p->n && moves; i++) {
     p->hot[i] = SUM(p, id, weight, temperature, i);
     for (PetscInt c = 0; c < ns; c++) {
-      p->along[i * ns + c] += SUM(p, id, weight, strain, i * ns + c);
+      if (strained) p->along[i * ns + c] += SUM(p, id, weight, strain, i * ns + c);
       if (c < 3) p->along[i * ns + c] -= SUM(p, id, weight, thermal, i);
     }
   }

@@ -358,6 +358,7 @@ static void ByData(const HycoFlowRule *rule, const HycoFlowPoint *p, const HycoM
   PetscReal reach = PETSC_MAX_REAL, value[2][2] = {{0, 0}, {0, 0}}, slope;
 
   *creep = *yield = 0;
+  if (!d->constant && !rule->hardens) return;
   for (PetscInt j = 0; j < rule->n_constants && d->constant; j++) {
     change.c[j] = d->constant[2 + j][i];
     Reach(p->c[j], change.c[j], &reach);

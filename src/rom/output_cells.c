@@ -733,6 +733,7 @@ static PetscErrorCode FindPoints(HycoROM m, HycoOutputCells p)
   for (PetscInt e = 0; e < p->mesh->n_cells; e++) {
     if (!p->stressed[e] || m->model->scene->body[p->mesh->cell_body[e]].law->linear) continue;
     for (PetscInt q = 0; q < nq; q++) point[p->n_flow * nq + q] = e * nq + q;
+    p->stressed[e] = PETSC_FALSE; /* not by its displacements */
     p->flow[p->n_flow++] = e;
   }
   PetscCall(HycoFEPointsCreate(p->fe, p->n_flow * nq, point, n_parameters, &p->points));
@@ -820,24 +821,20 @@ PetscErrorCode HycoROMOutputsStep(HycoROM m, PetscInt k)
 static PetscErrorCode TakeBeside(HycoROM m, HycoOutputCells p, const PetscReal mu[], const HycoDifference *d,
                                  const PetscReal u[])
 {
-  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, enters;
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, enters, strains;
 
   PetscFunctionBegin;
   changed[d->parameter] = PETSC_TRUE;
-  enters = HycoFEPointsChange(p->points, changed);
+  enters = HycoFEPointsChange(p->points, changed, &strains);
   for (PetscInt j = 1; j < 3; j++) {
     PetscReal at[HYCO_MAX_PARAMETERS];
 
     HycoDifferencePoint(d, m->model->scene, mu, j, at);
-    if (!enters) {
-      PetscCall(HycoFEPointsBeside(p->points, j, NULL));
-      continue;
-    }
-    PetscCall(HycoFESetParameters(p->fe, mu));
-    for (PetscInt i = 0; i < p->fe->n_dof; i++) p->beside[i] = u[i] - p->fe->u0[i];
-    PetscCall(HycoFESetParameters(p->fe, at));
-    for (PetscInt i = 0; i < p->fe->n_dof; i++) p->beside[i] += p->fe->u0[i];
-    PetscCall(HycoFEPointsBeside(p->points, j, p->beside));
+    if (strains) PetscCall(HycoFESetParameters(p->fe, mu));
+    for (PetscInt i = 0; i < p->fe->n_dof && strains; i++) p->beside[i] = u[i] - p->fe->u0[i];
+    if (enters) PetscCall(HycoFESetParameters(p->fe, at));
+    for (PetscInt i = 0; i < p->fe->n_dof && strains; i++) p->beside[i] += p->fe->u0[i];
+    PetscCall(HycoFEPointsBeside(p->points, j, enters, strains ? p->beside : NULL));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -196,21 +196,20 @@ PetscErrorCode HycoBodiesLawsBeside(HycoROM m, const PetscReal mu[], PetscInt po
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   HycoBodiesLaws o = w->laws;
   const PetscReal *own = w->bodies.mu;
-  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, strains;
 
   PetscFunctionBegin;
   if (!w->n_rows) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt p = 0; p < m->model->scene->n_variables; p++) changed[p] = (PetscBool)(mu[p] != own[p]);
-  if (!HycoFEPointsChange(o->points, changed)) {
-    PetscCall(HycoFEPointsBeside(o->points, point, NULL));
+  if (!HycoFEPointsChange(o->points, changed, &strains)) {
+    PetscCall(HycoFEPointsBeside(o->points, point, PETSC_FALSE, NULL));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(HycoFESetParameters(o->fe, own));
-  PetscCall(PetscArraycpy(o->u, w->u, o->fe->n_dof));
-  for (PetscInt i = 0; i < o->fe->n_dof; i++) o->u[i] -= o->fe->u0[i];
+  if (strains) PetscCall(HycoFESetParameters(o->fe, own));
+  for (PetscInt i = 0; i < o->fe->n_dof && strains; i++) o->u[i] = w->u[i] - o->fe->u0[i];
   PetscCall(HycoFESetParameters(o->fe, mu));
-  for (PetscInt i = 0; i < o->fe->n_dof; i++) o->u[i] += o->fe->u0[i];
-  PetscCall(HycoFEPointsBeside(o->points, point, o->u));
+  for (PetscInt i = 0; i < o->fe->n_dof && strains; i++) o->u[i] += o->fe->u0[i];
+  PetscCall(HycoFEPointsBeside(o->points, point, PETSC_TRUE, strains ? o->u : NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
