@@ -47,6 +47,7 @@ WARM = (('LAST', 'warm'), ('RANGE', '[850, 950]'), ('LAW', 'law: limback_anderss
 FLOAT = (('LAST', 'pace'), ('RANGE', '[5e-9, 2e-8]'), ('LAW', 'law: strain_hardening, rate: pace, exponent: 3, time_exponent: 0.6'), ('body: {', 'body: {plate: {young: 1e5, poisson: 0.3}, '),
          ('low: {y: 0}', 'low: {y: 0}, plate_left: {x: 0}'), ('right: -push*q', 'plate_top: push*q*(1 + 0.2*x)'),
          ('type: obstacle, group: high, normal: {y: 1}, gap: -stop*(0.2 + x)FRICTION', 'type: pair, slave: plate_low, master: high, tolerance: 1e-6, gap: stop*x*x'))
+EDGE = (('gap: -stop*(0.2 + x)', 'gap: stop*(10 + x)'), *YIELD)
 TRAP = ' + 0*sqrt(abs(push - 61.004) - 1e-7)'  # where a difference of whole paths has its point
 STEPS = ('-hyco_substeps', '4', '-hyco_step_inelastic', '1e3', '-hyco_newton_rtol', '1e-13')
 RANGES = {'push': (40, 80), 'stop': (1e-4, 4e-4), 'rate': (5e-10, 2e-9), 'limit': (35, 45), 'rough': (0.1, 0.5), 'ratio': (0.2, 0.4), 'warm': (850, 950), 'pace': (5e-9, 2e-8)}
@@ -91,7 +92,8 @@ class PathGradients(Case):
                     self.assertEqual(report[key], plain[key], key)
 
     def test_kink(self):
-        """A gap that closes exactly at a listed time: there, and of the extreme, derivatives are one-sided and flagged, towards larger loads; not elsewhere."""
+        """A gap that closes exactly at a listed time: there, and of the extreme, derivatives are one-sided and flagged, towards larger loads; not elsewhere. The same where a
+        model's body is just about to yield at a listed time."""
         grid = Grid()
         grid.box('line2', [[0, 0.5, 1]], lambda x: x, 'bar', {'x0': 'left', 'x1': 'right'})
         r = self.hyco('solve', '-scene', self.written(BAR, grid), '-mu', '0.5', '-gradient')
@@ -99,6 +101,10 @@ class PathGradients(Case):
         for output, expected in (('push', [0, 1, 0]), ('end', [0.5, 0, 0.9])):
             for value, exact in zip(r['gradient_times'][output]['p'], expected):
                 self.assertAlmostEqual(abs(value), exact, 7, output)
+        self.hyco('train', '-scene', self.write(EDGE), *STEPS, '-hyco_model_type', 'bodies', '-scatter', '6', '-model', 'edge.h5', status=None)
+        for limit, expected in ((45 * math.sqrt(0.79), [1]), (45.1 * math.sqrt(0.79), [])):  # von Mises stress of a pull in plane strain: sqrt(1 - 0.3 + 0.09)
+            r = self.hyco('predict', '-model', 'edge.h5', *STEPS, '-mu', f'45,2e-4,{limit!r}', '-gradient')
+            self.assertEqual([k['t'] for k in r['gradient_kinks'] if (k['output'], k['parameter'], k.get('t')) == ('end', 'push', 1)], expected)
 
     def test_failing(self):
         """A point beside which a path has no value: its derivatives are nan, those of the others of the set stand, and one line says so after the table and
