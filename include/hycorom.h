@@ -191,8 +191,8 @@ PetscErrorCode HycoROMGetEquilibrium(HycoROM model, HycoEquilibrium *equilibrium
 PetscErrorCode HycoROMGetPrediction(HycoROM model, HycoPrediction *prediction);
 /*
   Gets the gradient of the model's outputs at the last prediction (hycofom.h), by the linear system of its closed contacts
-  and differences of the model's data, never of predictions; of most paths, by differences of two paths for each parameter
-  in their steps. The prediction stays. Not collective. Fails without an output or a parameter, for a type without gradients,
+  and differences of the model's data, never of predictions; of paths but those of bodies, by differences of two paths for
+  each parameter in their steps. The prediction stays. Not collective. Fails without an output or a parameter, for a type without gradients,
   where the solve did not converge or a path did not end, and where the forces of closed contacts are not unique; after an
   error there is no last prediction.
 */

@@ -64,7 +64,7 @@ typedef struct _HycoROMOps {
   PetscErrorCode (*features)(HycoROM, PetscReal misfit[2]); /* features that indicate its errors, >= 0 */
   PetscErrorCode (*estimate)(HycoROM, HycoPrediction *);    /* its errors, without held-out points */
   /* gradients; without `residual` the type has none. Its problem is w = q + M z, z = (x, L): w = 0 for the p unknowns x,
-     0 <= w complementary to the n forces L >= 0. Of paths of elastic bodies: of a step from rest, mu with the time, with
+     0 <= w complementary to the n forces L >= 0. Of paths: of a step from rest of elastic bodies, mu with the time, with
      friction L by row (tangents follow the normal of their contact) */
   PetscErrorCode (*unknowns)(HycoROM, PetscInt *p, PetscInt *n, PetscReal z[]); /* z (p + n) of the last solve; NULL:
                                                                                    only the sizes */
@@ -74,7 +74,7 @@ typedef struct _HycoROMOps {
   PetscErrorCode (*stand)(HycoROM, PetscInt k, PetscInt listed,
                           PetscBool *able); /* NULL, or of paths; able: the problem becomes that of accepted step k, the
                                                listed time `listed` (-1: none), whose parameters and forces the model has;
-                                               k < 0: only asks. With friction, for each step from the first one on */
+                                               k < 0: only asks. With friction or laws with a past, for each step from the first one on */
   PetscErrorCode (*jacobian)(HycoROM, PetscInt k, const PetscInt contact[],
                              PetscReal M[]); /* of x and these k forces, p + k square by columns, at the last mu */
   PetscErrorCode (*beside)(
@@ -88,13 +88,13 @@ typedef struct _HycoROMOps {
                           PetscReal dU[]); /* with `beside`: the derivatives of the modes' coefficients and of the
                                               full-order displacements, for those of the data (the weighted sum of the
                                               changes at two points) and of z; modes (l), dofs (of mesh): which of them are wanted */
-  /* with friction: of the step that `stand` took. Its row of the normal, by contact, w with no slip before (p + n), and
+  /* then: of the step that `stand` took. Its row of the normal, by contact, w with no slip before (p + n), and
      size as of `residual` */
   PetscErrorCode (*rest)(HycoROM, const PetscInt **row, PetscReal w[], PetscReal *size);
   PetscErrorCode (*along)(
       HycoROM, PetscInt parameter, const PetscReal weight[3], const PetscInt point[3], const PetscReal q[],
       PetscReal dz[], PetscBool *regular); /* the derivative of z from q of that w, and from those of the steps before;
-                                              regular: the states of the contacts determine it */
+                                              regular: the states of contacts and laws determine it */
   PetscErrorCode (*show)(HycoROM, PetscInt parameter, PetscBool rows, PetscReal step,
                          const PetscReal dz[]); /* the friction of the model's contacts becomes that of z moved so */
   PetscErrorCode (*expand)(HycoROM);            /* sets what a solve sets (modes, displacements, forces) from that z */

@@ -231,6 +231,8 @@ typedef struct _n_HycoBodiesWork {
   HycoReason reason; /* of the last solve; its iterations */
   PetscInt its;
   char method[64];
+  const PetscReal *alpha,
+      *dalpha;             /* of gradients: the inelastic strains, and their change (borrowed); NULL: there are none */
   HycoBodiesBeside beside; /* of gradients (bodies_gradient.c); NULL: not needed yet */
 } * HycoBodiesWork;
 
@@ -309,13 +311,16 @@ PetscErrorCode HycoBodiesFrictionSlides(HycoBodiesFriction friction, HycoBodiesW
 */
 PetscErrorCode HycoBodiesAlongDestroy(HycoBodiesFriction friction);
 PetscErrorCode HycoBodiesAlongStand(HycoROM model, HycoBodiesFriction friction, HycoBodiesWork work, PetscInt k,
-                                    PetscBool *able);
+                                    const PetscReal alpha[], PetscBool *able);
 void HycoBodiesAlongRest(HycoBodiesFriction friction, const PetscInt **row, PetscReal w[], PetscReal *size);
 PetscErrorCode HycoBodiesAlongNear(HycoROM model, HycoBodiesFriction friction, const PetscReal mu[],
                                    const PetscInt row[], PetscBool rows, const PetscReal z[], PetscInt point,
                                    PetscReal w[]);
 PetscErrorCode HycoBodiesAlongStep(HycoBodiesFriction friction, PetscInt parameter, const PetscReal weight[3],
                                    const PetscInt point[3], const PetscReal q[], PetscReal dz[], PetscBool *regular);
+/* After the last HycoBodiesAlongStep() of a parameter: its slips and work. */
+PetscErrorCode HycoBodiesAlongTake(HycoBodiesFriction friction, PetscInt parameter, const PetscReal dz[],
+                                   PetscBool *regular);
 PetscErrorCode HycoBodiesAlongShow(HycoROM model, HycoBodiesFriction friction, PetscInt parameter, PetscBool rows,
                                    PetscReal step, const PetscReal dz[]);
 /* By row. Borrowed. */
@@ -343,6 +348,12 @@ PetscErrorCode HycoBodiesRows(HycoBodiesWork work, PetscInt k, PetscInt n, Petsc
 PetscErrorCode HycoBodiesAddRows(HycoBodiesWork work, PetscInt k, const PetscReal share_a[], const PetscReal share_H[],
                                  const PetscReal x[], const PetscReal f[], PetscReal row[]);
 PetscErrorCode HycoBodiesForgetBeside(HycoBodiesWork work);
+/* The derivatives of the displacements u[nd] of the points' cells, as HycoBodiesSlope(), with those of inelastic strains. */
+PetscErrorCode HycoBodiesCellsSlope(HycoBodiesWork work, PetscInt n, const PetscInt contact[],
+                                    const PetscReal weight[2], const PetscInt point[2], const PetscReal dz[],
+                                    const PetscReal dalpha[], const PetscReal u[], PetscReal du[]);
+/* The gaps of the model's contacts, and the largest term of one. */
+void HycoBodiesGaps(HycoROM model, PetscReal w[], PetscReal *size);
 /* w[p] of the present loads and forces, on the motions that contact alone prevents. */
 void HycoBodiesWorkOnMotions(HycoBodiesWork work, PetscReal w[]);
 /* The part of the loads, without round-off. */
@@ -373,8 +384,9 @@ PetscReal HycoBodiesBound(HycoBodiesWork work, PetscReal *norm);
 PetscInt HycoBodiesAt(HycoSubstructures bodies, PetscInt place);
 /* The coefficients of the modes, and the displacements of the unknowns inside. */
 PetscErrorCode HycoBodiesExpand(HycoBodiesWork work, PetscReal gamma[]);
-/* Adds those of inelastic strains to gamma. */
+/* Adds those of inelastic strains to gamma; of one body. */
 void HycoBodiesAddStrains(HycoBodiesWork work, const PetscReal alpha[], PetscReal gamma[]);
+void HycoBodiesAddStrainsOf(HycoBodiesWork work, PetscInt body, const PetscReal alpha[], PetscReal gamma[]);
 /* Reads from or writes to the model's file. */
 PetscErrorCode HycoBodiesFile(HycoROM model, HycoH5 file);
 /* Makes the model one of paths (bodies_path.c). */

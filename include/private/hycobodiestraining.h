@@ -109,10 +109,7 @@ typedef struct {
 /* Whether the model has modes of inelastic forces: with a history, where a law is not linear. */
 static inline PetscBool HycoBodiesFlow(HycoReducer t)
 {
-  PetscBool flows = PETSC_FALSE;
-
-  for (PetscInt k = 0; k < t->scene->n_bodies; k++) flows = (PetscBool)(flows || !t->scene->body[k].law->linear);
-  return (PetscBool)(t->scene->n_times && flows);
+  return (PetscBool)(t->scene->n_times && HycoSceneFlows(t->scene));
 }
 PetscErrorCode HycoBodiesBegin(HycoReducer reducer);
 PetscErrorCode HycoBodiesModes(HycoReducer reducer, HycoSnapshots store);

@@ -20,6 +20,7 @@ typedef struct {
 
 typedef struct {
   PetscInt n_constants; /* number of the law's own constants */
+  PetscBool hardens;    /* creep depends on creep0 */
   /* Optional: computes what does not depend on the stress, once per point; why: the reason for which the point is
      refused, left NULL otherwise. */
   void (*prepare)(HycoFlowPoint *, const char **why);

@@ -14,7 +14,7 @@
 PetscErrorCode HycoGradientCheckScene(HycoScene scene);
 
 /* The points of a difference along a parameter: mu + step[k], the first with step 0, weight[k] of the data there. */
-typedef struct {
+typedef struct _n_HycoDifference {
   PetscInt parameter;
   PetscReal step[3], weight[3];
   int sign; /* the direction of one-sided derivatives: 1; at the upper end of the range -1 */

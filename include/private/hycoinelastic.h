@@ -139,6 +139,33 @@ PetscErrorCode HycoFEStepPoints(HycoFE fe, PetscInt n, const PetscInt point[], c
                                 HycoFEStepReport *report);
 
 /*
+  Laws at some points (of bodies whose laws have `slopes`) along known displacements, with the derivatives of their states by
+  n_slopes parameters. HycoFEPointsBegin(): the initial state. HycoFEPointsStep(): from the accepted state to u (n_dof) at
+  t1, at fe's parameters; s and C - C_t as HycoFEStepPoints() (NULL: not wanted). HycoFEPointsBeside(): keeps the data at
+  fe's present parameters, and the strains of u there (NULL: those of the step), as those of point 1 to 4 of a difference;
+  changes false: all is as in the step. HycoFEPointsSlope(): the state's derivative by parameter k, du with displacements (n_dof); ds, dstress:
+  n x n_sigma, or NULL; *smooth: false: a point leaves its yield surface. HycoFEPointsAccept(): the step's state becomes the
+  accepted one. Stress and weights of the step are borrowed. Not collective.
+*/
+typedef struct _n_HycoFEPoints *HycoFEPoints;
+PetscErrorCode HycoFEPointsCreate(HycoFE fe, PetscInt n, const PetscInt point[], PetscInt n_slopes,
+                                  HycoFEPoints *points);
+PetscErrorCode HycoFEPointsDestroy(HycoFEPoints *points);
+PetscErrorCode HycoFEPointsBegin(HycoFEPoints points);
+PetscErrorCode HycoFEPointsStep(HycoFEPoints points, const PetscReal u[], PetscReal t0, PetscReal t1, PetscReal s[],
+                                PetscReal lost[]);
+/* Whether parameters change the laws' data; *strains: also the strains of the same free displacements. */
+PetscBool HycoFEPointsChange(HycoFEPoints points, const PetscBool changed[], PetscBool *strains);
+PetscErrorCode HycoFEPointsBeside(HycoFEPoints points, PetscInt id, PetscBool changes, const PetscReal u[]);
+PetscErrorCode HycoFEPointsSlope(HycoFEPoints points, PetscInt k, const PetscReal weight[3], const PetscInt id[3],
+                                 const PetscReal du[], PetscReal ds[], PetscReal dstress[], PetscBool *smooth);
+PetscErrorCode HycoFEPointsAccept(HycoFEPoints points);
+const PetscReal *HycoFEPointsStress(HycoFEPoints points);
+const PetscReal *HycoFEPointsWeights(HycoFEPoints points);
+/* The derivative of the weights (n). */
+void HycoFEPointsWeightSlope(HycoFEPoints points, const PetscReal weight[3], const PetscInt id[3], PetscReal slope[]);
+
+/*
   The linear bodies' contribution to f_int at some nodes, K u minus the force of thermal strains, for repeated
   evaluations at one time: a matrix product in place of their integration points. `nodes` (n_nodes; NULL: all): the
   nodes whose rows are wanted. HycoLinearForceSet(): at fe's parameters; K: the linear bodies' tangents or the nodes'

@@ -5,6 +5,20 @@
 #include <hycomaterial.h>
 #include <hycosceneimpl.h>
 
+/* A direction of change of a step's data, and the derivatives of its results along it, by point as in HycoMaterialPoints. */
+typedef struct {
+  const PetscReal *strain, *state0; /* at the step's end; at its begin */
+  const PetscReal *const *constant; /* as in HycoMaterialPoints; NULL: these and the temperatures stay */
+  const PetscReal *temperature;     /* NULL: stays */
+  PetscReal *state, *stress, *lost; /* lost: of what the stress lacks of that of an elastic strain */
+  /* raised over the points: the largest rate of an equivalent stress; that at which points on their yield surface, or at
+     rest, leave it */
+  PetscReal rate, apart;
+} HycoMaterialSlope;
+/* After HycoMaterialUpdate() of these points: along n directions. */
+typedef PetscErrorCode (*HycoMaterialSlopes)(HycoMaterial material, const HycoMaterialPoints *points, PetscInt n,
+                                             HycoMaterialSlope slope[]);
+
 struct _p_HycoMaterial {
   PETSCHEADER(struct _HycoMaterialOps);
   /* constants declared by the type */
@@ -16,12 +30,21 @@ struct _p_HycoMaterial {
   const char *folder;          /* folder of the scene's relative paths; borrowed */
   HycoExpr temperature;        /* owned by the body; NULL: it has none */
   void *data;
+  HycoMaterialSlopes slopes; /* NULL: the law has no derivatives by its data, or its tangents are not exact */
 };
 
 /* Components of strain and stress in `dim` dimensions. */
 static inline PetscInt HycoStrainSize(PetscInt dim)
 {
   return dim == 1 ? 1 : dim == 2 ? 4 : 6;
+}
+/* Whether a body of the scene deforms inelastically. */
+static inline PetscBool HycoSceneFlows(HycoScene scene)
+{
+  for (PetscInt b = 0; b < scene->n_bodies; b++) {
+    if (!scene->body[b].law->linear) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
 }
 /* Von Mises' equivalent of a stress (xx, yy, zz, xy, yz, xz as far as HycoStrainSize(); 1D: its size). */
 PetscReal HycoMises(PetscInt dim, const PetscReal stress[]);

@@ -302,6 +302,22 @@ PetscBool HycoROMOutputsAreForces(HycoROM model);
    change displacements that supports prescribe to the latter. */
 void HycoROMParametersEnter(HycoROM model, const PetscBool changed[], PetscBool *measured, PetscBool *slopes,
                             PetscBool *held);
+/*
+  The derivatives of the stresses of a path where bodies flow. HycoROMFocusPath(): as HycoROMFocusOutputs() for all listed
+  times, which have been measured, with the laws' points there. HycoROMOutputsStep(): their step to accepted time k, from the
+  first one on; HycoROMOutputsAlong(): then its derivative by the difference's parameter, with those of displacements; *smooth: false: a
+  point leaves its yield surface. HycoROMOutputsMove(): quantities are those of stresses moved so along a parameter.
+  HycoROMOutputsFlow(): there are such stresses. HycoROMOutputsFollow(): all quantities have derivatives so.
+*/
+PetscErrorCode HycoROMFocusPath(HycoROM model, PetscBool *focused);
+PetscBool HycoROMPathIsFocused(HycoROM model);
+PetscErrorCode HycoROMOutputsStep(HycoROM model, PetscInt k);
+struct _n_HycoDifference;
+PetscErrorCode HycoROMOutputsAlong(HycoROM model, const PetscReal mu[], const struct _n_HycoDifference *difference,
+                                   const PetscReal dgamma[], const PetscReal dU[], PetscBool *smooth);
+void HycoROMOutputsMove(HycoROM model, PetscInt parameter, PetscReal step);
+PetscBool HycoROMOutputsFlow(HycoROM model);
+PetscBool HycoROMOutputsFollow(HycoROM model);
 /* Makes near[] of these n contacts, with the forces of the last prediction. HycoROMExchange(): near[side] takes the place of
    the model's contacts, which it has until the next call: motions of fe do not move what the prediction left. */
 PetscErrorCode HycoROMMakeNear(HycoROM model, PetscInt n, const PetscInt contact[]);

@@ -27,8 +27,7 @@ PetscErrorCode HycoPathNew(MPI_Comm comm, HycoScene scene, HycoPath *path)
   p->smallest = 1e-10;
   p->substeps = 1;
   /* Without inelastic laws the stiffness is constant and one iteration solves a step. */
-  for (PetscInt b = 0; scene && b < scene->n_bodies; b++)
-    p->flows = (PetscBool)(p->flows || !scene->body[b].law->linear);
+  p->flows = (PetscBool)(scene && HycoSceneFlows(scene));
   *path = p;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

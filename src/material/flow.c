@@ -268,6 +268,18 @@ static void Finish(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscInt i, 
   if (m->stored) Energies(rule, &w->p, m, i, &f, energy);
 }
 
+/* The data of point i. */
+static void Take(const HycoFlowRule *rule, const HycoMaterialPoints *m, PetscInt i, HycoFlowPoint *p)
+{
+  const PetscReal *accumulated = m->state0 + i * (m->n_strain + 2) + m->n_strain;
+
+  for (PetscInt j = 0; j < rule->n_constants; j++) p->c[j] = m->constant[2 + j][i];
+  p->dt = m->dt;
+  p->temperature = m->temperature ? m->temperature[i] : 0;
+  p->creep0 = accumulated[0];
+  p->plastic0 = accumulated[1];
+}
+
 /* Evaluates the law at n points from `first`: the iterations of different points are interleaved, so that the
    processor does not wait for one logarithm after the other. The first failure of the batch is reported, with its
    reason. */
@@ -282,11 +294,7 @@ static void UpdateBlock(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscIn
     Work *w = &work[k];
     const char *why = NULL;
 
-    for (PetscInt j = 0; j < rule->n_constants; j++) w->p.c[j] = m->constant[2 + j][i];
-    w->p.dt = m->dt;
-    w->p.temperature = m->temperature ? m->temperature[i] : 0;
-    w->p.creep0 = m->state0[i * (ns + 2) + ns];
-    w->p.plastic0 = m->state0[i * (ns + 2) + ns + 1];
+    Take(rule, m, i, &w->p);
     if (rule->prepare) (*rule->prepare)(&w->p, &why);
     if (why && m->failed < 0) {
       m->failed = i;
@@ -327,6 +335,194 @@ static PetscErrorCode Update(HycoMaterial material, HycoMaterialPoints *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* -- derivatives of a step -- */
+
+#define RELATIVE 3e-6   /* step of the differences of a rule's functions */
+#define REST     1e-150 /* a stress beside 0 */
+#define BORDER   1e-8   /* share of the yield stress: less beyond or below it is round-off */
+
+/* How far a direction of change goes for RELATIVE of the data, from what it has gone so far. */
+static void Reach(PetscReal value, PetscReal change, PetscReal *reach)
+{
+  const PetscReal own = value != 0 ? PetscAbsReal(value) : 1;
+
+  if (change != 0) *reach = PetscMin(*reach, RELATIVE * own / PetscAbsReal(change));
+}
+
+/* The derivatives of the creep strain at the stress q, and of the yield stress at the plastic strain x, by the data alone. */
+static void ByData(const HycoFlowRule *rule, const HycoFlowPoint *p, const HycoMaterialSlope *d, PetscInt i,
+                   PetscReal creep0, PetscReal q, PetscReal x, PetscReal *creep, PetscReal *yield)
+{
+  HycoFlowPoint change = {.temperature = d->constant && d->temperature ? d->temperature[i] : 0,
+                          .creep0 = rule->hardens ? creep0 : 0};
+  PetscReal reach = PETSC_MAX_REAL, value[2][2] = {{0, 0}, {0, 0}}, slope;
+
+  *creep = *yield = 0;
+  if (!d->constant && !rule->hardens) return;
+  for (PetscInt j = 0; j < rule->n_constants && d->constant; j++) {
+    change.c[j] = d->constant[2 + j][i];
+    Reach(p->c[j], change.c[j], &reach);
+  }
+  Reach(p->temperature, change.temperature, &reach);
+  Reach(p->creep0, change.creep0, &reach);
+  if (reach == PETSC_MAX_REAL) return;
+  for (int side = 0; side < 2; side++) {
+    const PetscReal step = side ? reach : -reach;
+    HycoFlowPoint at = *p;
+    const char *why = NULL;
+
+    for (PetscInt j = 0; j < rule->n_constants; j++) at.c[j] += step * change.c[j];
+    at.temperature += step * change.temperature;
+    at.creep0 += step * change.creep0;
+    if (rule->prepare) (*rule->prepare)(&at, &why);
+    if (rule->creep && p->dt > 0 && q > 0) value[side][0] = (*rule->creep)(&at, q, &slope);
+    if (rule->yield) value[side][1] = (*rule->yield)(&at, x, &slope);
+  }
+  *creep = (value[1][0] - value[0][0]) / (2 * reach);
+  *yield = (value[1][1] - value[0][1]) / (2 * reach);
+}
+
+/* A point's solved step: with the flow's equations at it. */
+typedef struct {
+  Work w;
+  PetscReal creep, plastic, q, slope, yield, hardening, G, bulk; /* slope: of creep by q; yield < 0: none */
+  PetscBool yields;                                              /* the equations are those of yielding */
+} Solved;
+
+/* As the step has decided: on the border, where the plastic strain is round-off, by the solution for creep alone again. */
+static PetscBool Yields(const HycoFlowRule *rule, Solved *s)
+{
+  PetscReal before, hardening;
+  Work w = s->w;
+
+  if (!rule->yield || !(w.trial > 0)) return PETSC_FALSE;
+  before = (*rule->yield)(&w.p, w.p.plastic0, &hardening);
+  if (before < 0 || s->plastic > 0 || s->q < (1 - BORDER) * before) return (PetscBool)(before >= 0 && s->plastic > 0);
+  StartCreep(rule, &w);
+  while (!w.done) IterateCreep(rule, &w);
+  return (PetscBool)(w.q > before);
+}
+
+static void TakeSolved(const HycoFlowRule *rule, const HycoMaterialPoints *m, PetscInt i, Solved *s)
+{
+  const PetscInt ns = m->n_strain;
+  const PetscReal young = m->constant[0][i], poisson = m->constant[1][i], *state0 = m->state0 + i * (ns + 2),
+                  *state = m->state + i * (ns + 2);
+  const char *why = NULL;
+
+  Take(rule, m, i, &s->w.p);
+  if (rule->prepare) (*rule->prepare)(&s->w.p, &why);
+  Begin(m, i, &s->w);
+  s->G = young / (2 * (1 + poisson));
+  s->bulk = young / (3 * (1 - 2 * poisson));
+  s->creep = state[ns] - state0[ns];
+  s->plastic = state[ns + 1] - state0[ns + 1];
+  s->q = s->w.trial - s->w.H * (s->creep + s->plastic);
+  s->slope = s->hardening = 0;
+  s->yield = -1;
+  /* At rest: whether creep begins in proportion to the stress. */
+  if (rule->creep && s->w.p.dt > 0) (void)(*rule->creep)(&s->w.p, s->w.trial > 0 ? s->q : REST, &s->slope);
+  if (rule->yield) s->yield = (*rule->yield)(&s->w.p, state[ns + 1], &s->hardening);
+  s->yields = Yields(rule, s);
+}
+
+/* Along direction d: the derivatives of q + H (creep + plastic) = q_tr, and of q = Y where plastic strain flows. */
+static void Slope(const HycoFlowRule *rule, const HycoMaterialPoints *m, PetscInt i, const Solved *s,
+                  HycoMaterialSlope *d)
+{
+  const PetscInt ns = m->n_strain;
+  const PetscReal young = m->constant[0][i], poisson = m->constant[1][i], *strain = m->strain + i * ns,
+                  *state0 = m->state0 + i * (ns + 2), *dstrain = d->strain + i * ns,
+                  *dstate0 = d->state0 + i * (ns + 2);
+  const PetscReal dyoung = d->constant ? d->constant[0][i] : 0, dpoisson = d->constant ? d->constant[1][i] : 0;
+  const PetscReal dG = s->G * (dyoung / young - dpoisson / (1 + poisson)),
+                  dbulk = s->bulk * (dyoung / young + 2 * dpoisson / (1 - 2 * poisson)), H = s->w.H,
+                  dH = ns == 1 ? dyoung : 3 * dG, dp = s->creep + s->plastic;
+  PetscReal trace[4] = {0, 0, 0, 0}, dev[6], rate[6], trial = 0, by_creep, by_yield, dq, creep, plastic = 0, unit, turn;
+  PetscReal *state = d->state + i * (ns + 2), *stress = d->stress + i * ns, *lost = d->lost + i * ns;
+
+  /* Traces: of the elastic strain and its change; of the whole strain and its change. */
+  for (PetscInt c = 0; c < 3 && ns > 1; c++) {
+    trace[0] += strain[c] - state0[c];
+    trace[1] += dstrain[c] - dstate0[c];
+    trace[2] += strain[c];
+    trace[3] += dstrain[c];
+  }
+  for (PetscInt c = 0; c < ns; c++) {
+    const PetscReal stiff = ns == 1 ? young : c < 3 ? 2 * s->G : s->G, more = ns == 1 ? dyoung : c < 3 ? 2 * dG : dG;
+    const PetscReal mean = ns > 1 && c < 3 ? 1.0 / 3 : 0;
+
+    /* The deviator's change; in 1D the stress's. */
+    dev[c] = stiff * (dstrain[c] - dstate0[c] - mean * trace[1]) + more * (strain[c] - state0[c] - mean * trace[0]);
+    rate[c] = (c < 3 ? 1 : 2) * s->w.s[c];
+    trial += rate[c] * dev[c];
+    /* Were the strain elastic: */
+    lost[c] = stiff * (dstrain[c] - mean * trace[3]) + more * (strain[c] - mean * trace[2]);
+    if (mean > 0) lost[c] += s->bulk * trace[3] + dbulk * trace[2];
+  }
+  /* Without a trial stress nothing flows, and q has no direction. */
+  for (PetscInt c = 0; c < ns && !(s->w.trial > 0) && s->slope > 0; c++)
+    d->apart = PetscMax(d->apart, PetscAbsReal(dev[c]));
+  trial = s->w.trial > 0 ? (ns == 1 ? 1 : 1.5) * trial / s->w.trial : 0;
+  ByData(rule, &s->w.p, d, i, dstate0[ns], s->q, m->state[i * (ns + 2) + ns + 1], &by_creep, &by_yield);
+  if (s->yields) {
+    dq = s->hardening * (dstate0[ns + 1] + (trial - dp * dH) / H - by_creep) + by_yield;
+    dq /= 1 + s->hardening * (1 / H + s->slope);
+    creep = s->slope * dq + by_creep;
+    plastic = (trial - dp * dH - dq) / H - creep;
+  } else {
+    dq = (trial - H * by_creep - dp * dH) / (1 + H * s->slope);
+    creep = s->slope * dq + by_creep;
+  }
+  d->rate = PetscMax(d->rate, PetscMax(PetscAbsReal(trial), PetscAbsReal(dq)));
+  /* On the yield surface the point stays there, or its derivatives differ between the two sides. */
+  if (s->yields && H * s->plastic <= BORDER * s->yield)
+    d->apart = PetscMax(d->apart, H * PetscAbsReal(plastic));
+  else if (!s->yields && s->yield >= 0 && s->q >= (1 - BORDER) * s->yield)
+    d->apart = PetscMax(d->apart, PetscAbsReal(dq - s->hardening * dstate0[ns + 1] - by_yield));
+  unit = s->w.trial > 0 ? (ns == 1 ? 1.0 : 1.5) / s->w.trial : 0;
+  turn = ns == 1 ? 0 : dp * unit;
+  for (PetscInt c = 0; c < ns; c++) {
+    /* d (dp N) = d dp N + dp dN, N = 3/2 s / q_tr; in 1D N is a sign. */
+    const PetscReal N = unit * s->w.s[c], twice = c < 3 ? 1 : 2;
+
+    state[c] = dstate0[c] + twice * ((creep + plastic) * N);
+    if (ns > 1 && s->w.trial > 0) state[c] += twice * turn * (dev[c] - s->w.s[c] * trial / s->w.trial);
+  }
+  state[ns] = dstate0[ns] + creep;
+  state[ns + 1] = dstate0[ns + 1] + plastic;
+  for (PetscInt c = 0; c < ns; c++) {
+    const PetscReal stiff = ns == 1 ? young : c < 3 ? 2 * s->G : s->G, more = ns == 1 ? dyoung : c < 3 ? 2 * dG : dG;
+    const PetscReal mean = ns > 1 && c < 3 ? 1.0 / 3 : 0, *inelastic = m->state + i * (ns + 2);
+    PetscReal all = 0, sum = 0;
+
+    for (PetscInt k = 0; k < 3 && mean > 0; k++) {
+      all += state[k];
+      sum += inelastic[k];
+    }
+    /* C and its change times the inelastic strain. */
+    unit = stiff * (state[c] - mean * all) + more * (inelastic[c] - mean * sum);
+    if (mean > 0) unit += s->bulk * all + dbulk * sum;
+    stress[c] = lost[c] - unit;
+    lost[c] = unit;
+  }
+}
+
+/* A HycoMaterialSlopes. */
+static PetscErrorCode Slopes(HycoMaterial material, const HycoMaterialPoints *m, PetscInt n, HycoMaterialSlope d[])
+{
+  const HycoFlowRule *rule = (const HycoFlowRule *)material->data;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < m->n; i++) {
+    Solved s;
+
+    TakeSolved(rule, m, i, &s);
+    for (PetscInt k = 0; k < n; k++) Slope(rule, m, i, &s, &d[k]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* State names are those of the outputs. */
 static PetscErrorCode SetUp(HycoMaterial material, PetscInt dim)
 {
@@ -363,6 +559,7 @@ PetscErrorCode HycoFlowEnd(HycoMaterial material, const HycoFlowRule *rule)
   PetscFunctionBegin;
   PetscCall(HycoMaterialSetLinear(material, PETSC_FALSE));
   material->data = (void *)(uintptr_t)rule;
+  material->slopes = Slopes;
   PetscCall(HycoMaterialSetOps(material, &ops));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

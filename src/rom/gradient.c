@@ -7,6 +7,7 @@
 */
 #include <hycogradient.h>
 #include <hycolcp.h>
+#include <hycomaterialimpl.h>
 #include <hycoromimpl.h>
 
 typedef struct {
@@ -15,11 +16,11 @@ typedef struct {
   PetscInt p, n, k, *contact; /* unknowns x, forces; those that are closed or undecided */
   PetscInt n_contacts;        /* of `near` */
   const PetscInt *row;        /* with friction the row of a contact's normal among the forces; NULL: there is none */
-  PetscBool friction;
-  PetscBool passing;    /* a step whose outputs are not listed */
-  PetscInt *list;       /* n: the contacts of the problem, once the problem is that of some */
-  PetscBool near, held; /* held: supports hold nodes of the contacts */
-  PetscInt parameter;   /* in hand */
+  PetscBool friction, past;   /* past: a step depends on those before */
+  PetscBool passing;          /* a step whose outputs are not listed */
+  PetscInt *list;             /* n: the contacts of the problem, once the problem is that of some */
+  PetscBool near, held;       /* held: supports hold nodes of the contacts */
+  PetscInt parameter;         /* in hand */
   /* it changes the contacts' rows or gaps; enters the outputs' cells beside displacements, and those of
      means known by their slopes; moves supports of these */
   PetscBool rows, enters, means, moved_means;
@@ -109,8 +110,9 @@ static PetscErrorCode MeasureMoved(Work *o, const PetscReal mu[], const PetscRea
   const HycoShear shear = o->m->trace.seen;
 
   PetscFunctionBegin;
-  if (o->row) PetscCall((*o->m->ops->show)(o->m, o->parameter, o->rows, step, o->dz));
-  HycoFinally(MeasureState(o, mu, u0, step, output), o->row ? HycoTraceShowOther(o->m, &shear) : (void)0);
+  if (o->friction) PetscCall((*o->m->ops->show)(o->m, o->parameter, o->rows, step, o->dz));
+  HycoROMOutputsMove(o->m, o->parameter, step);
+  HycoFinally(MeasureState(o, mu, u0, step, output), o->friction ? HycoTraceShowOther(o->m, &shear) : (void)0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -215,7 +217,7 @@ static PetscErrorCode Focus(Work *o)
   PetscCall(PetscCalloc1(m->model->l + 1, &o->dgamma));
   PetscCall(PetscCalloc1(m->model->l + 1, &o->modes));
   PetscCall(PetscCalloc1(m->model->mesh->n_nodes * m->model->mesh->dim + 1, &o->dofs));
-  if (!o->passing) HycoROMOutputsRead(m, o->modes, o->dofs);
+  if (!o->passing || HycoROMOutputsFlow(m)) HycoROMOutputsRead(m, o->modes, o->dofs);
   PetscCall(PetscCalloc1(m->fe->n_dof + 1, &o->dU));
   PetscCall(PetscMalloc1(o->n + 1, &o->list));
   for (PetscInt i = 0; i < o->n; i++) o->list[i] = i;
@@ -232,7 +234,7 @@ static PetscErrorCode Focus(Work *o)
   if (!o->row) o->n_contacts = o->n;
   PetscCall(HycoROMMakeNear(m, o->n_contacts, o->list));
   o->near = PETSC_TRUE;
-  o->forces = (PetscBool)(o->passing || o->contacts || HycoROMOutputsAreForces(m));
+  o->forces = (PetscBool)(!HycoROMOutputsFlow(m) && (o->passing || o->contacts || HycoROMOutputsAreForces(m)));
   o->held = HycoRowsAreHeld(m->fe, &m->near[0].pairs);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -265,7 +267,7 @@ static PetscErrorCode Create(Work *o)
   PetscCall(PetscMalloc3(o->n + 1, &o->contact, o->p + o->n + 1, &o->q, o->p + o->n + 1, &o->v));
   PetscCall(PetscCalloc1(6 * m->model->scene->n_quantities + 1, &o->output));
   PetscUseTypeMethod(m, unknowns, &o->p, &o->n, o->z);
-  if (o->friction)
+  if (o->past)
     PetscUseTypeMethod(m, rest, &o->row, o->w[0], &largest);
   else
     PetscCall((*m->ops->residual)(m, NULL, o->z, o->w[0], &largest));
@@ -288,7 +290,8 @@ static PetscErrorCode Create(Work *o)
     PetscCall(MoveAndMeasure(o, NULL, o->z, o->output));
   /* Extremes are measured where they are now: a maximum's place does not move in a derivative, by the envelope
      theorem. */
-  PetscCall(HycoROMFocusOutputs(m, o->output, &o->focused));
+  o->focused = HycoROMPathIsFocused(m);
+  if (!o->focused) PetscCall(HycoROMFocusOutputs(m, o->output, &o->focused));
   /* Of a type without `beside` the values of fewer terms, whose round-off is that of the differences. */
   if (o->focused && !m->ops->beside) PetscCall(MoveAndMeasure(o, NULL, o->z, o->output));
   if (m->ops->beside) PetscCall(Focus(o));
@@ -414,6 +417,7 @@ static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *kink)
   if (o->near && !o->forces)
     PetscCall(
         (*o->m->ops->slope)(o->m, o->n, o->list, d->weight + 1, o->at + 1, o->dz, o->modes, o->dofs, o->dgamma, o->dU));
+  if (o->past) PetscCall(HycoROMOutputsAlong(o->m, o->mu, d, o->dgamma, o->dU, &o->regular));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -463,7 +467,7 @@ static PetscErrorCode Restore(Work *o)
   HycoROM m = o->m;
 
   PetscFunctionBegin;
-  if (o->focused) PetscCall(HycoROMUnfocusOutputs(m));
+  if (o->focused && !HycoROMPathIsFocused(m)) PetscCall(HycoROMUnfocusOutputs(m));
   if (!o->near) PetscCall(Move(o, o->mu, o->z));
   m->prediction = o->prediction;
   /* Also what getters of the prediction read: the gradient must not be visible in them. */
@@ -498,6 +502,7 @@ PetscErrorCode HycoROMStateGradient(HycoROM m, HycoGradientStore *store, HycoGra
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  o.past = (PetscBool)(m->model->scene->n_times && (o.friction || HycoSceneFlows(m->model->scene)));
   PetscCall(HycoROMComplete(m));
   ierr = Create(&o);
   if (!ierr && o.regular) {

@@ -3,6 +3,7 @@
   from the modes there, U = r(u0) + V gamma (30); for a path the laws are replayed there, once for all listed times.
 */
 #include <hycofields.h>
+#include <hycogradient.h>
 #include <hycoinelastic.h>
 #include <hycomaterialimpl.h>
 #include <hycopath.h>
@@ -24,7 +25,14 @@ struct _n_HycoOutputCells {
   PetscBool *without;       /* n_quantities: means that are not measured here, but known by their slopes; NULL: none */
   PetscReal *slope;         /* n_quantities x (l + n_fe): of these, by gamma and by full-order displacements */
   PetscReal *held,
-      *u0; /* by prescribed displacements of all cells, n_quantities x n_dof there; these at the prediction */
+      *u0;           /* by prescribed displacements of all cells, n_quantities x n_dof there; these at the prediction */
+  PetscReal *listed; /* of a path where bodies flow: sigma at the listed times */
+  HycoFEPoints points; /* of derivatives of such a path: the points of cells that flow, and are stressed; NULL: none */
+  PetscInt n_flow, *flow;      /* these cells */
+  PetscReal *flowing, *slopes; /* their stresses, n_flow x n_sigma, and by parameter these derivatives */
+  PetscReal *along, *beside;   /* n_dof: of displacements */
+  PetscInt parameter;          /* and how far, and along which, the state is moved */
+  PetscReal step;
   PetscReal *reaction;       /* n_dof, of supports; NULL: no quantity needs them */
   PetscInt *surface_node;    /* by node: its number on fe_surface; -1: in no contact. Allocated with reaction */
   HycoFE fe_surface;         /* on the model's mesh without its cells; NULL until needed */
@@ -38,6 +46,9 @@ PetscErrorCode HycoOutputCellsDestroy(HycoOutputCells *cells)
   PetscCall(HycoFEDestroy(&(*cells)->fe));
   PetscCall(HycoFEDestroy(&(*cells)->fe_surface));
   PetscCall(HycoResultantsDestroy(&(*cells)->resultants));
+  PetscCall(HycoFEPointsDestroy(&(*cells)->points));
+  HycoFreeAll(&(*cells)->listed, &(*cells)->flow, &(*cells)->flowing, &(*cells)->slopes, &(*cells)->along,
+              &(*cells)->beside);
   PetscCall(HycoMeshDestroy(&(*cells)->mesh));
   HycoFreeAll(&(*cells)->V, &(*cells)->u, &(*cells)->sigma, &(*cells)->means, &(*cells)->stressed, &(*cells)->fe_at,
               &(*cells)->torn, &(*cells)->without, &(*cells)->slope, &(*cells)->held, &(*cells)->u0,
@@ -271,6 +282,9 @@ static PetscErrorCode March(HycoOutputCells p, HycoReplay *r)
   HycoTrace *trace = &m->trace;
 
   PetscFunctionBegin;
+  if (!p->listed)
+    PetscCall(PetscMalloc1((size_t)(m->model->scene->n_times + 1) * (size_t)(p->mesh->n_cells * p->fe->n_sigma) + 1,
+                           &p->listed));
   for (PetscInt k = 0, j = 0; k < trace->n; k++) {
     PetscCall(HycoReplayMove(r, k));
     if (p->mesh->n_cells <= KEPT) PetscCall(HycoFEKeepGradients(p->fe));
@@ -279,6 +293,8 @@ static PetscErrorCode March(HycoOutputCells p, HycoReplay *r)
     PetscCall(HycoReplayStep(r, k, p->u));
     if (j == trace->n_listed || trace->at[j] != k) continue;
     PetscCall(HycoFEStateFields(p->fe, r->march.state, p->sigma, NULL, NULL, NULL));
+    PetscCall(PetscArraycpy(p->listed + (size_t)j * (size_t)(p->mesh->n_cells * p->fe->n_sigma), p->sigma,
+                            p->mesh->n_cells * p->fe->n_sigma));
     PetscCall(ReactPredicted(m, p, r->march.f_int, ForcesAt(m, j)));
     PetscCall(MeasurePredicted(m, p, ForcesAt(m, j), trace->step[j].quantity));
     j++;
@@ -309,6 +325,9 @@ static PetscErrorCode Follow(HycoROM m, HycoOutputCells p, const PetscReal mu[])
   /* Gradients are kept while no parameter moves the nodes; where stresses vary within cells, of each point of few cells. */
   if (p->fe->thermal && p->mesh->n_cells <= KEPT) PetscCall(HycoFEKeepGradients(p->fe));
   PetscCall(HycoFEStressKept(p->fe, p->stressed, p->u, &p->means, p->sigma));
+  for (PetscInt i = 0; i < p->n_flow * p->fe->n_sigma; i++)
+    p->sigma[p->flow[i / p->fe->n_sigma] * p->fe->n_sigma + i % p->fe->n_sigma] =
+        p->flowing[i] + p->step * p->slopes[p->parameter * p->n_flow * p->fe->n_sigma + i];
   PetscCall(ReactPredicted(m, p, NULL, m->Lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -666,6 +685,193 @@ PetscErrorCode HycoROMFocusOutputs(HycoROM m, const PetscReal value[], PetscBool
   *focused = PETSC_TRUE;
   PetscCall(HycoROMUnfocusOutputs(m)); /* an exchange, its own inverse */
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- derivatives of a path where bodies flow -- */
+
+/* The cells that decide quantities at some listed time, into m->few. */
+static PetscErrorCode FindFewOfPath(HycoROM m, HycoOutputCells p)
+{
+  const HycoTrace *trace = &m->trace;
+  const size_t size = (size_t)(p->mesh->n_cells * p->fe->n_sigma), l = (size_t)m->model->l,
+               n_fe = (size_t)m->model->n_fe;
+  const PetscBool without[HYCO_MAX_QUANTITIES] = {PETSC_FALSE};
+  PetscInt *keep, n;
+  PetscBool *needed, *at;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(p->mesh->n_cells, &at, p->mesh->n_cells, &needed, p->mesh->n_cells, &keep));
+  PetscCall(PetscArrayzero(needed, p->mesh->n_cells));
+  for (PetscInt j = 0; j < trace->n_listed; j++) {
+    PetscReal mu[HYCO_MAX_PARAMETERS];
+
+    HycoSceneSetTime(m->model->scene, m->fe->mu, trace->t[trace->at[j]], mu);
+    PetscCall(HycoFESetParameters(p->fe, mu));
+    Displace(m, p, trace->gamma + (size_t)trace->at[j] * l, trace->U_fe + (size_t)trace->at[j] * n_fe);
+    PetscCall(HycoQuantitiesMarkDecisive(p->fe, p->u, p->listed + (size_t)j * size, trace->step[j].quantity, without,
+                                         HycoResultantsSuffice(m, p->resultants), at));
+    for (PetscInt e = 0; e < p->mesh->n_cells; e++) needed[e] = (PetscBool)(needed[e] || at[e]);
+  }
+  PetscCall(List(p->mesh->n_cells, needed, &n, keep));
+  if (!n) keep[n++] = 0; /* a mesh has a cell */
+  PetscCall(MakeFew(m, p, n, keep));
+  PetscCall(PetscFree3(at, needed, keep));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The points of cells whose stresses are those of laws with a past. */
+static PetscErrorCode FindPoints(HycoROM m, HycoOutputCells p)
+{
+  const PetscInt nq = HycoElementGet(p->mesh->type)->nq, n_parameters = m->model->scene->n_parameters,
+                 ns = p->fe->n_sigma;
+  PetscInt *point;
+
+  PetscFunctionBegin;
+  if (p->points) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(p->mesh->n_cells, &p->flow));
+  PetscCall(PetscMalloc1(p->mesh->n_cells * nq, &point));
+  for (PetscInt e = 0; e < p->mesh->n_cells; e++) {
+    if (!p->stressed[e] || m->model->scene->body[p->mesh->cell_body[e]].law->linear) continue;
+    for (PetscInt q = 0; q < nq; q++) point[p->n_flow * nq + q] = e * nq + q;
+    p->stressed[e] = PETSC_FALSE; /* not by its displacements */
+    p->flow[p->n_flow++] = e;
+  }
+  PetscCall(HycoFEPointsCreate(p->fe, p->n_flow * nq, point, n_parameters, &p->points));
+  PetscCall(PetscFree(point));
+  PetscCall(PetscMalloc1(p->n_flow * ns + 1, &p->flowing));
+  PetscCall(PetscCalloc1(n_parameters * p->n_flow * ns + 1, &p->slopes));
+  PetscCall(PetscMalloc1(p->fe->n_dof, &p->along));
+  PetscCall(PetscMalloc1(p->fe->n_dof, &p->beside));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMFocusPath(HycoROM m, PetscBool *focused)
+{
+  HycoOutputCells p = m->output_cells;
+
+  PetscFunctionBegin;
+  *focused = PETSC_FALSE;
+  if (!p) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(FindFewOfPath(m, p));
+  if (!m->few->without) PetscCall(PetscCalloc1(m->model->scene->n_quantities + 1, &m->few->without));
+  PetscCall(FindPoints(m, m->few));
+  *focused = PETSC_TRUE;
+  PetscCall(HycoROMUnfocusOutputs(m)); /* an exchange, its own inverse */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscBool HycoROMPathIsFocused(HycoROM m)
+{
+  return (PetscBool)(m->output_cells && m->output_cells->points);
+}
+
+PetscBool HycoROMOutputsFlow(HycoROM m)
+{
+  return (PetscBool)(m->output_cells && m->output_cells->n_flow);
+}
+
+/* Reactions of laws with a past only by balance. */
+PetscBool HycoROMOutputsFollow(HycoROM m)
+{
+  return (PetscBool)(!m->output_cells || !m->output_cells->reaction ||
+                     HycoResultantsSuffice(m, m->output_cells->resultants));
+}
+
+/* The means over cells of stresses at the points, or of their derivatives. */
+static void TakeMeans(HycoOutputCells p, const PetscReal stress[], PetscReal mean[])
+{
+  const PetscInt nq = HycoElementGet(p->mesh->type)->nq, ns = p->fe->n_sigma;
+  const PetscReal *weight = HycoFEPointsWeights(p->points);
+
+  for (PetscInt i = 0; i < p->n_flow; i++) {
+    PetscReal volume = 0;
+
+    for (PetscInt c = 0; c < ns; c++) mean[i * ns + c] = 0;
+    for (PetscInt q = i * nq; q < (i + 1) * nq; q++) {
+      volume += weight[q];
+      for (PetscInt c = 0; c < ns; c++) mean[i * ns + c] += weight[q] * stress[q * ns + c];
+    }
+    for (PetscInt c = 0; c < ns; c++) mean[i * ns + c] /= volume;
+  }
+}
+
+PetscErrorCode HycoROMOutputsStep(HycoROM m, PetscInt k)
+{
+  const HycoTrace *trace = &m->trace;
+  HycoOutputCells p = m->output_cells;
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  if (!HycoROMOutputsFlow(m)) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoSceneSetTime(m->model->scene, m->fe->mu, trace->t[k], mu);
+  PetscCall(HycoFESetParameters(p->fe, mu));
+  PetscCall(HycoFEKeepGradients(p->fe));
+  if (k)
+    PetscCall(HycoFEPointsAccept(p->points));
+  else
+    PetscCall(HycoFEPointsBegin(p->points));
+  Displace(m, p, trace->gamma + (size_t)k * (size_t)m->model->l, trace->U_fe + (size_t)k * (size_t)m->model->n_fe);
+  PetscCall(PetscArraycpy(p->along, p->u, p->fe->n_dof));
+  PetscCall(HycoFEPointsStep(p->points, p->u, trace->t[PetscMax(k - 1, 0)], trace->t[k], NULL, NULL));
+  TakeMeans(p, HycoFEPointsStress(p->points), p->flowing);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The data of the laws at the points of a difference; u: the displacements of the step. */
+static PetscErrorCode TakeBeside(HycoROM m, HycoOutputCells p, const PetscReal mu[], const HycoDifference *d,
+                                 const PetscReal u[])
+{
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, enters, strains;
+
+  PetscFunctionBegin;
+  changed[d->parameter] = PETSC_TRUE;
+  enters = HycoFEPointsChange(p->points, changed, &strains);
+  for (PetscInt j = 1; j < 3; j++) {
+    PetscReal at[HYCO_MAX_PARAMETERS];
+
+    HycoDifferencePoint(d, m->model->scene, mu, j, at);
+    if (strains) PetscCall(HycoFESetParameters(p->fe, mu));
+    for (PetscInt i = 0; i < p->fe->n_dof && strains; i++) p->beside[i] = u[i] - p->fe->u0[i];
+    if (enters) PetscCall(HycoFESetParameters(p->fe, at));
+    for (PetscInt i = 0; i < p->fe->n_dof && strains; i++) p->beside[i] += p->fe->u0[i];
+    PetscCall(HycoFEPointsBeside(p->points, j, enters, strains ? p->beside : NULL));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMOutputsAlong(HycoROM m, const PetscReal mu[], const HycoDifference *d, const PetscReal dgamma[],
+                                   const PetscReal dU[], PetscBool *smooth)
+{
+  static const PetscInt point[] = {0, 1, 2};
+  const PetscInt l = m->model->l;
+  HycoOutputCells p = m->output_cells;
+  PetscReal *stress;
+
+  PetscFunctionBegin;
+  *smooth = PETSC_TRUE;
+  if (!HycoROMOutputsFlow(m)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(TakeBeside(m, p, mu, d, p->along));
+  PetscCall(HycoFESetParameters(p->fe, mu));
+  PetscCall(HycoFEKeepGradients(p->fe));
+  for (PetscInt k = 0; k < p->fe->n_dof; k++) {
+    p->beside[k] = 0;
+    for (PetscInt j = 0; j < l; j++) p->beside[k] += p->V[k * l + j] * dgamma[j];
+  }
+  for (PetscInt k = 0; k < m->model->n_fe; k++) {
+    if (p->fe_at[k] >= 0) p->beside[p->fe_at[k]] = dU[m->model->fe_dof[k]];
+  }
+  PetscCall(PetscMalloc1(p->n_flow * HycoElementGet(p->mesh->type)->nq * p->fe->n_sigma, &stress));
+  PetscCall(HycoFEPointsSlope(p->points, d->parameter, d->weight, point, p->beside, NULL, stress, smooth));
+  TakeMeans(p, stress, p->slopes + d->parameter * p->n_flow * p->fe->n_sigma);
+  PetscCall(PetscFree(stress));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoROMOutputsMove(HycoROM m, PetscInt parameter, PetscReal step)
+{
+  if (!HycoROMOutputsFlow(m)) return;
+  m->output_cells->parameter = parameter;
+  m->output_cells->step = step;
 }
 
 /* NULL: no output reads a cell, as where all are of contacts. */

@@ -1,5 +1,6 @@
 /* The gradient of a predicted path: step by step, else by the paths beside it in its own steps. */
 #include <hycogradient.h>
+#include <hycomaterialimpl.h>
 #include <hycoromimpl.h>
 
 typedef struct {
@@ -50,12 +51,24 @@ static PetscErrorCode TakeStep(HycoROM m, PetscInt k, PetscInt listed, PetscBool
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* At the steps one after the other; without friction these do not depend on each other, and those between the listed times
+/* The outputs at a listed time: of bodies that flow those of the path, which has their stresses. */
+static PetscErrorCode MeasureListed(HycoROM m, PetscInt listed)
+{
+  PetscFunctionBegin;
+  if (HycoSceneFlows(m->model->scene))
+    PetscCall(PetscArraycpy(m->prediction.quantity, m->trace.step[listed].quantity, m->model->scene->n_quantities));
+  else
+    PetscCall(HycoROMMeasureQuantities(m, &m->prediction));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* At the steps one after the other; without friction and flow these do not depend on each other, and those between the listed times
    are left out. *done: false, where one has no derivative. */
 static PetscErrorCode AtTimes(HycoROM m, const HycoStep step[], HycoGradient *gradient, PetscBool *done)
 {
   const PetscInt n = gradient->n_outputs * gradient->n_parameters, n_listed = m->trace.n_listed;
-  const PetscBool all = HycoSceneHasFriction(m->model->scene);
+  const PetscBool flows = HycoSceneFlows(m->model->scene),
+                  all = (PetscBool)(flows || HycoSceneHasFriction(m->model->scene));
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
@@ -68,8 +81,9 @@ static PetscErrorCode AtTimes(HycoROM m, const HycoStep step[], HycoGradient *gr
     if (!lists && !all) continue;
     PetscCall(TakeStep(m, k, lists ? listed : -1, done));
     if (!*done) break;
+    if (flows) PetscCall(HycoROMOutputsStep(m, k));
     m->trace.n_listed = 0; /* the outputs are those of this state, and of no path */
-    ierr = lists ? HycoROMMeasureQuantities(m, &m->prediction) : PETSC_SUCCESS;
+    ierr = lists ? MeasureListed(m, listed) : PETSC_SUCCESS;
     m->measured = lists;
     if (!ierr) ierr = HycoROMStateGradient(m, lists ? &there : NULL, &at, done);
     m->trace.n_listed = n_listed;
@@ -86,14 +100,16 @@ static PetscErrorCode ByTimes(HycoROM m, const HycoStep step[], HycoGradient *gr
   const HycoPrediction prediction = m->prediction;
   const PetscBool measured = m->measured;
   const PetscInt shown = m->trace.shown;
-  PetscBool able = PETSC_FALSE;
+  PetscBool able = PETSC_FALSE, flows = HycoSceneFlows(m->model->scene), focused = PETSC_FALSE;
 
   PetscFunctionBegin;
   *done = PETSC_FALSE;
   PetscTryTypeMethod(m, stand, -1, -1, &able);
-  if (!able) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!able || (flows && !HycoROMOutputsFollow(m))) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoGradientCreate(m->model->scene, &m->gradient, gradient));
+  if (flows) PetscCall(HycoROMFocusPath(m, &focused));
   HycoOnError(AtTimes(m, step, gradient, done), m->solved = m->ready = PETSC_FALSE);
+  if (focused) PetscCall(HycoROMUnfocusOutputs(m));
   m->prediction = prediction;
   m->measured = measured;
   PetscCall(HycoROMSetStep(m, shown));

@@ -19,7 +19,7 @@ scene: {title: a block that is pressed on a stop while it flows, mesh: mesh.msh,
 parameter: {push: {range: [40, 80]}, stop: {range: [1e-4, 4e-4]}, LAST: {range: RANGE}}
 body: {block: {LAW, young: 1e5, poisson: 0.3}}
 fixed: {left: {x: 0}, low: {y: 0}}
-pressure: {right: -push*q}
+pressure: {right: -push*qTRAP}
 contact: {wall: {type: obstacle, group: high, normal: {y: 1}, gap: -stop*(0.2 + x)FRICTION}}
 output:
   end: {max: u_x, group: right}
@@ -42,19 +42,28 @@ CREEP = (('LAST', 'rate'), ('RANGE', '[5e-10, 2e-9]'), ('LAW', 'law: norton, rat
 YIELD = (('LAST', 'limit'), ('RANGE', '[35, 45]'), ('LAW', 'law: j2, yield: limit, hardening: 5000'), ('FRICTION', ''))
 PLAIN = (('LAST', 'ratio'), ('RANGE', '[0.2, 0.4]'), ('LAW', 'law: elastic'), ('poisson: 0.3', 'poisson: ratio'), ('FRICTION', ''))
 RUB = (('LAST', 'rough'), ('RANGE', '[0.1, 0.5]'), ('LAW', 'law: elastic'), ('FRICTION', ', friction: rough'))
+WARM = (('LAST', 'warm'), ('RANGE', '[850, 950]'), ('LAW', 'law: limback_andersson, temperature: warm + 10*q + 20*x, expansion: 1e-6, reference_temperature: 800'),
+        ('FRICTION', ', friction: 0.3'))
+FLOAT = (('LAST', 'pace'), ('RANGE', '[5e-9, 2e-8]'), ('LAW', 'law: strain_hardening, rate: pace, exponent: 3, time_exponent: 0.6'), ('body: {', 'body: {plate: {young: 1e5, poisson: 0.3}, '),
+         ('low: {y: 0}', 'low: {y: 0}, plate_left: {x: 0}'), ('right: -push*q', 'plate_top: push*q*(1 + 0.2*x)'),
+         ('type: obstacle, group: high, normal: {y: 1}, gap: -stop*(0.2 + x)FRICTION', 'type: pair, slave: plate_low, master: high, tolerance: 1e-6, gap: stop*x*x'))
+EDGE = (('gap: -stop*(0.2 + x)', 'gap: stop*(10 + x)'), *YIELD)
+TRAP = ' + 0*sqrt(abs(push - 61.004) - 1e-7)'  # where a difference of whole paths has its point
 STEPS = ('-hyco_substeps', '4', '-hyco_step_inelastic', '1e3', '-hyco_newton_rtol', '1e-13')
-RANGES = {'push': (40, 80), 'stop': (1e-4, 4e-4), 'rate': (5e-10, 2e-9), 'limit': (35, 45), 'rough': (0.1, 0.5), 'ratio': (0.2, 0.4)}
-WIDTH = 2e-4  # of the central differences, as a share of the range
+RANGES = {'push': (40, 80), 'stop': (1e-4, 4e-4), 'rate': (5e-10, 2e-9), 'limit': (35, 45), 'rough': (0.1, 0.5), 'ratio': (0.2, 0.4), 'warm': (850, 950), 'pace': (5e-9, 2e-8)}
+WIDTH = 1.6e-4  # of the central differences, as a share of the range
 
 
 class PathGradients(Case):
-    def write(self, laws):
+    def write(self, laws, trap=''):
         text = SCENE
         for a, b in laws:
             text = text.replace(a, b)
         grid = Grid()
         grid.box('quad4', [[0, 0.3, 0.6, 1], [0, 0.5, 1]], lambda x: x, 'block', {'x0': 'left', 'x1': 'right', 'y0': 'low', 'y1': 'high'})
-        return self.written(text, grid)
+        if laws == FLOAT:
+            grid.box('quad4', [[0, 0.3, 0.6, 1], [1, 1.4]], lambda x: x, 'plate', {'x0': 'plate_left', 'y0': 'plate_low', 'y1': 'plate_top'})
+        return self.written(text.replace('TRAP', trap), grid)
 
     def differ(self, found, low, high, scale, what):
         """A derivative times its range is the central difference of the values."""
@@ -83,7 +92,8 @@ class PathGradients(Case):
                     self.assertEqual(report[key], plain[key], key)
 
     def test_kink(self):
-        """A gap that closes exactly at a listed time: there, and of the extreme, derivatives are one-sided and flagged, towards larger loads; not elsewhere."""
+        """A gap that closes exactly at a listed time: there, and of the extreme, derivatives are one-sided and flagged, towards larger loads; not elsewhere. The same where a
+        model's body is just about to yield at a listed time."""
         grid = Grid()
         grid.box('line2', [[0, 0.5, 1]], lambda x: x, 'bar', {'x0': 'left', 'x1': 'right'})
         r = self.hyco('solve', '-scene', self.written(BAR, grid), '-mu', '0.5', '-gradient')
@@ -91,6 +101,10 @@ class PathGradients(Case):
         for output, expected in (('push', [0, 1, 0]), ('end', [0.5, 0, 0.9])):
             for value, exact in zip(r['gradient_times'][output]['p'], expected):
                 self.assertAlmostEqual(abs(value), exact, 7, output)
+        self.hyco('train', '-scene', self.write(EDGE), *STEPS, '-hyco_model_type', 'bodies', '-scatter', '6', '-model', 'edge.h5', status=None)
+        for limit, expected in ((45 * math.sqrt(0.79), [1]), (45.1 * math.sqrt(0.79), [])):  # von Mises stress of a pull in plane strain: sqrt(1 - 0.3 + 0.09)
+            r = self.hyco('predict', '-model', 'edge.h5', *STEPS, '-mu', f'45,2e-4,{limit!r}', '-gradient')
+            self.assertEqual([k['t'] for k in r['gradient_kinks'] if (k['output'], k['parameter'], k.get('t')) == ('end', 'push', 1)], expected)
 
     def test_failing(self):
         """A point beside which a path has no value: its derivatives are nan, those of the others of the set stand, and one line says so after the table and
@@ -123,12 +137,14 @@ class PathGradients(Case):
                 self.assertFalse(os.path.exists(self.path('none.json')))
 
     def test_models(self):
-        """Models of bodies (elastic without and with friction, creep) and hybrid ones, at the end and of the extremes; a prediction stays; outputs of a path
-        determine its parameters."""
-        for kind, laws, name, mu in (('bodies', PLAIN, 'ratio', 0.31), ('hybrid', CREEP, 'rate', 1.1e-9), ('bodies', RUB, 'rough', 0.23), ('bodies', CREEP, 'rate', 1.1e-9)):
-            self.hyco('train', '-scene', self.write(laws), *STEPS, '-hyco_model_type', kind, '-scatter', '6', '-model', 'm.h5', status=None)
+        """Models of bodies (elastic without and with friction; yielding; creep alone, with friction, under a body that floats) and hybrid ones, at the end and of the
+        extremes, those of bodies where no path beside has a value; a prediction stays; outputs of a path determine its parameters."""
+        for kind, laws, name, mu in (('bodies', PLAIN, 'ratio', 0.31), ('hybrid', CREEP, 'rate', 1.1e-9), ('bodies', RUB, 'rough', 0.23), ('bodies', YIELD, 'limit', 39.0),
+                                     ('bodies', WARM, 'warm', 897.0), ('bodies', FLOAT, 'pace', 1.1e-8), ('bodies', CREEP, 'rate', 1.1e-9)):
+            model = f'{kind}_{name}.h5'
+            self.hyco('train', '-scene', self.write(laws, TRAP if kind == 'bodies' else ''), *STEPS, '-hyco_model_type', kind, '-scatter', '6', '-model', model, status=None)
             point = {'push': 61.0, 'stop': 2.3e-4, name: mu}
-            at = ('predict', '-model', 'm.h5', *STEPS, '-mu', ','.join(map(repr, point.values())))
+            at = ('predict', '-model', model, *STEPS, '-mu', ','.join(map(repr, point.values())))
             report = self.hyco(*at, '-gradient')
             self.assertEqual(report['gradient_kinks'], [])
             if laws == PLAIN:  # whose cells follow a ratio that changes their flexibility
@@ -142,7 +158,7 @@ class PathGradients(Case):
                 for p, width in widths.items():
                     for sign in (-1, 1):
                         f.write(','.join(repr(value + sign * WIDTH / 2 * width * (n == p)) for n, value in point.items()) + '\n')
-            self.hyco('predict', '-model', 'm.h5', *STEPS, '-points', 'points.csv', '-table', 'rows.h5')
+            self.hyco('predict', '-model', model, *STEPS, '-points', 'points.csv', '-table', 'rows.h5')
             with h5py.File(self.path('rows.h5')) as f:  # all digits
                 rows = {key: f[key][:] for output in report['outputs'] for key in (output, 'path_' + output)}
             for k, (p, width) in enumerate(widths.items()):
@@ -156,7 +172,7 @@ class PathGradients(Case):
         self.assertEqual(report['history']['outputs'], plain['history']['outputs'])
         held, mean = (plain['history']['outputs'][name] for name in ('held', 'mean'))
         near = ','.join(repr(value + 0.05 * (RANGES[p][1] - RANGES[p][0])) for p, value in point.items())
-        r = self.hyco('fit', '-model', 'm.h5', *STEPS, '-target_end', repr(plain['outputs']['end']), '-target_held', repr(held[-1]),
+        r = self.hyco('fit', '-model', model, *STEPS, '-target_end', repr(plain['outputs']['end']), '-target_held', repr(held[-1]),
                       '-target_mean', repr(mean[-1]), '-mu', near, '-target_path_held', repr(max(held)), '-target_path_mean', repr(max(mean)))
         self.assertTrue(r['converged'])
         self.assertLess(r['misfit_model'], 1e-6)

@@ -36,7 +36,8 @@ static PetscReal Creep(const HycoFlowPoint *p, PetscReal q, PetscReal *slope)
 /* Without an integral of creep, which has no closed form: the law has no potential. */
 PetscErrorCode HycoMaterialCreate_StrainHardening(HycoMaterial material)
 {
-  static const HycoFlowRule rule = {.n_constants = N_CONSTANTS, .prepare = Prepare, .creep = Creep};
+  static const HycoFlowRule rule = {
+      .n_constants = N_CONSTANTS, .hardens = PETSC_TRUE, .prepare = Prepare, .creep = Creep};
 
   PetscFunctionBegin;
   PetscCall(HycoElasticDeclare(material));

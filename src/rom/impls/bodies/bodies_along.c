@@ -25,7 +25,7 @@ struct _n_HycoBodiesAlong {
   PetscReal *slip, *work;   /* by parameter: s' by row; of the work, by contact */
   PetscReal *g, *q, *w;     /* p + rows */
   PetscReal *force, *spent; /* 3 n_contacts; n_contacts: friction that is shown */
-  PetscReal size;           /* of gaps and displacements */
+  PetscReal size, rate;     /* of gaps and displacements; of the change of gaps at fixed forces */
 };
 
 /* NULL-safe, also where no derivatives have been asked for. */
@@ -88,7 +88,8 @@ static void TakeOld(HycoBodiesFriction f)
 }
 
 /* The forces of the path solve the step at once, and give the factor of its states. */
-PetscErrorCode HycoBodiesAlongStand(HycoROM m, HycoBodiesFriction f, HycoBodiesWork o, PetscInt k, PetscBool *able)
+PetscErrorCode HycoBodiesAlongStand(HycoROM m, HycoBodiesFriction f, HycoBodiesWork o, PetscInt k,
+                                    const PetscReal alpha[], PetscBool *able)
 {
   const PetscInt n = f->all.n, N = f->p + n, parameters = m->model->scene->n_parameters;
   const PetscReal *taken = f->taken + (size_t)k * (size_t)N;
@@ -110,7 +111,7 @@ PetscErrorCode HycoBodiesAlongStand(HycoROM m, HycoBodiesFriction f, HycoBodiesW
   }
   PetscCall(HycoBodiesFrictionPrepare(f, o, m->fe->mu));
   PetscCall(PetscArraycpy(f->z, taken, N));
-  PetscCall(HycoBodiesFrictionTouch(f, o, 0, NULL, PETSC_TRUE, &its, able));
+  PetscCall(HycoBodiesFrictionTouch(f, o, 0, alpha, PETSC_TRUE, &its, able));
   for (PetscInt i = f->p; i < N; i++) most = PetscMax(most, PetscAbsReal(taken[i]));
   for (PetscInt i = f->p; i < N; i++) *able = (PetscBool)(*able && PetscAbsReal(f->z[i] - taken[i]) <= RETURNED * most);
   PetscCall(HycoBodiesFrictionMove(f, o, &kkt));
@@ -243,8 +244,7 @@ PetscErrorCode HycoBodiesAlongStep(HycoBodiesFriction f, PetscInt parameter, con
 {
   HycoBodiesAlong a = f->along;
   const PetscInt n = f->all.n, p = f->p, N = p + n;
-  const PetscReal most = Largest(n, f->z + p), *r = f->z + p;
-  PetscReal *slip = a->slip + parameter * n, *work = a->work + parameter * f->slip.n, rate_r, rate_w;
+  const PetscReal *slip = a->slip + parameter * n;
 
   PetscFunctionBegin;
   *regular = PETSC_TRUE;
@@ -252,7 +252,7 @@ PetscErrorCode HycoBodiesAlongStep(HycoBodiesFriction f, PetscInt parameter, con
   PetscCall(PetscArrayzero(dz, N));
   PetscCall(PetscArraycpy(a->w, q, N));
   for (PetscInt i = 0; i < n; i++) a->w[p + i] += slip[i];
-  rate_w = Largest(n, a->w + p);
+  a->rate = Largest(n, a->w + p);
   for (PetscInt k = 0; k < f->slip.n; k++) {
     PetscReal *d = a->mu + k; /* in place of the path's own */
 
@@ -267,8 +267,19 @@ PetscErrorCode HycoBodiesAlongStep(HycoBodiesFriction f, PetscInt parameter, con
   if (!*regular) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt i = 0; i < N; i++) dz[i] += a->g[i];
   AddProduct(f, dz, a->w);
-  rate_r = Largest(n, dz + p);
-  rate_w = PetscMax(rate_w, Largest(n, a->w + p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesAlongTake(HycoBodiesFriction f, PetscInt parameter, const PetscReal dz[], PetscBool *regular)
+{
+  HycoBodiesAlong a = f->along;
+  const PetscInt n = f->all.n, p = f->p;
+  const PetscReal most = Largest(n, f->z + p), *r = f->z + p, rate_r = Largest(n, dz + p),
+                  rate_w = PetscMax(a->rate, Largest(n, a->w + p));
+  PetscReal *slip = a->slip + parameter * n, *work = a->work + parameter * f->slip.n;
+
+  PetscFunctionBegin;
+  *regular = PETSC_TRUE;
   for (PetscInt k = 0; k < f->slip.n; k++) {
     const PetscInt first = f->slip.row[k];
 

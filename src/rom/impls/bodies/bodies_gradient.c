@@ -17,7 +17,7 @@ PetscErrorCode HycoBodiesUnknowns(HycoROM m, PetscInt *p, PetscInt *n, PetscReal
 }
 
 /* The gaps, and the largest term of one. */
-static void Gaps(HycoROM m, PetscReal w[], PetscReal *size)
+void HycoBodiesGaps(HycoROM m, PetscReal w[], PetscReal *size)
 {
   HycoBodiesWork o = (HycoBodiesWork)m->work;
 
@@ -63,7 +63,7 @@ PetscErrorCode HycoBodiesResidual(HycoROM m, const PetscReal mu[], const PetscRe
   if (!w) PetscFunctionReturn(PETSC_SUCCESS);
   /* First the motions, then the contacts: the order of the unknowns z. */
   HycoBodiesWorkOnMotions(o, w);
-  Gaps(m, w + b->p, size);
+  HycoBodiesGaps(m, w + b->p, size);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -319,6 +319,20 @@ static PetscErrorCode ExpandSlope(HycoBodiesWork o, PetscInt k, const Parts *cha
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The derivatives of what inelastic strains add to the fields: the bodies that have some do not turn. */
+static void AddStrainSlopes(HycoBodiesWork o, const Parts *change, PetscReal dgamma[])
+{
+  PetscReal *dalpha;
+
+  PetscCallVoid(PetscMalloc1(o->bodies->inelastic->m + 1, &dalpha));
+  for (PetscInt k = 0; k < o->bodies->n; k++) {
+    for (PetscInt i = 0; i < o->bodies->inelastic->m; i++)
+      dalpha[i] = o->dalpha[i] - change->kappa[k] / o->kappa[k] * o->alpha[i];
+    HycoBodiesAddStrainsOf(o, k, dalpha, dgamma);
+  }
+  PetscCallVoid(PetscFree(dalpha));
+}
+
 /* As HycoBodiesMove(): U' = Q u' + Q' u at the nodes with a place, where dofs are wanted; prescribed displacements are the
    caller's. */
 static void MoveSlope(HycoBodiesWork o, const Parts *change, const PetscReal du[], const PetscBool dofs[],
@@ -367,7 +381,50 @@ static void FindWanted(HycoBodiesWork o, const PetscBool modes[], const PetscBoo
   }
 }
 
-/* The change of the data is that of the weighted points, that of the forces has their change too. */
+/* The change of the data, the weighted sum of those at two points, with that of the forces. */
+static Parts SumChanges(HycoBodiesWork o, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
+                        const PetscInt point[2], const PetscReal dz[])
+{
+  const HycoBodiesBeside s = o->beside;
+  PetscReal *sum = s->change[0], *f = sum + s->size - o->bodies->ns;
+
+  for (PetscInt i = 0; i < s->size; i++)
+    sum[i] = weight[0] * s->change[point[0]][i] + weight[1] * s->change[point[1]][i];
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscReal force = dz[o->bodies->p + k];
+
+    for (PetscInt e = o->row_start[contact[k]]; e < o->row_start[contact[k] + 1] && force != 0; e++)
+      f[o->row_at[e]] += o->row[e] * force;
+  }
+  return PartsOf(o, sum);
+}
+
+PetscErrorCode HycoBodiesCellsSlope(HycoBodiesWork o, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
+                                    const PetscInt point[2], const PetscReal dz[], const PetscReal dalpha[],
+                                    const PetscReal u[], PetscReal du[])
+{
+  const HycoSubstructures b = o->bodies;
+  const HycoBodiesInelastic in = b->inelastic;
+  const Parts change = SumChanges(o, n, contact, weight, point, dz);
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(du, in->nd));
+  if (AnyOf(b->r, change.c)) AddRowProducts(in->nd, b->r, in->R, change.c, 1, du);
+  AddRowProducts(in->nd, b->ns, in->C, change.f, -1, du);
+  AddRowProducts(in->nd, in->m, in->A, dalpha, 1, du);
+  for (PetscInt i = 0; i < in->nd; i++) {
+    const PetscReal *Z = in->Z + i * b->p, kappa = o->kappa[in->body[i]];
+    PetscReal elastic = u[i], moved = 0;
+
+    for (PetscInt j = 0; j < b->p; j++) {
+      elastic -= Z[j] * o->x[j];
+      moved += Z[j] * dz[j];
+    }
+    du[i] = (du[i] - change.kappa[in->body[i]] * elastic) / kappa + moved;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoBodiesSlope(HycoROM m, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
                                const PetscInt point[2], const PetscReal dz[], const PetscBool modes[],
                                const PetscBool dofs[], PetscReal dgamma[], PetscReal dU[])
@@ -375,21 +432,18 @@ PetscErrorCode HycoBodiesSlope(HycoROM m, PetscInt n, const PetscInt contact[], 
   HycoBodiesWork o = (HycoBodiesWork)m->work;
   const HycoSubstructures b = o->bodies;
   const HycoBodiesBeside s = o->beside;
-  PetscReal *sum = s->change[0], *du = s->du, *f = sum + s->size - b->ns;
-  const Parts change = PartsOf(o, sum);
+  const Parts change = SumChanges(o, n, contact, weight, point, dz);
   const PetscReal *of = change.weight;
+  PetscReal *du = s->du;
   PetscBool *wanted;
 
   PetscFunctionBegin;
-  for (PetscInt i = 0; i < s->size; i++)
-    sum[i] = weight[0] * s->change[point[0]][i] + weight[1] * s->change[point[1]][i];
-  for (PetscInt k = 0; k < n; k++) {
-    for (PetscInt e = o->row_start[contact[k]]; e < o->row_start[contact[k] + 1]; e++)
-      f[o->row_at[e]] += o->row[e] * dz[b->p + k];
-  }
   PetscCall(PetscArrayzero(du, b->ns + b->ni));
   PetscCall(AddDisplacements(o, &change, du));
   AddRowProducts(b->ns, b->p, o->Z, dz, 1, du);
+  for (PetscInt k = 0; k < b->n && o->dalpha; k++)
+    AddRowProducts(b->body[k].n, b->inelastic->m, b->inelastic->P + b->start[k] * b->inelastic->m, o->dalpha,
+                   1 / o->kappa[k], du + b->start[k]);
   PetscCall(PetscArrayzero(dgamma, b->l));
   PetscCall(PetscMalloc1(b->n, &wanted));
   FindWanted(o, modes, dofs, wanted);
@@ -397,6 +451,7 @@ PetscErrorCode HycoBodiesSlope(HycoROM m, PetscInt n, const PetscInt contact[], 
     if (wanted[k]) PetscCall(ExpandSlope(o, k, &change, of, dz, dgamma, du + b->ns));
   }
   PetscCall(PetscFree(wanted));
+  if (o->dalpha) AddStrainSlopes(o, &change, dgamma);
   MoveSlope(o, &change, du, dofs, dU);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -595,7 +595,7 @@ static PetscErrorCode Evaluate(HycoROM m, PetscReal t0, PetscReal t1, const Pets
 }
 
 /* Factors J = 1 - sum of T_p^T (C - C_t) S_p at the laws' tangents; it is stored by rows. */
-static PetscErrorCode Tangent(HycoROM m, HycoStepAttempt *a)
+PetscErrorCode HycoBodiesTangent(HycoROM m, HycoStepAttempt *a)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const PetscInt ns = m->fe->n_sigma, l = w->bodies.bodies->inelastic->m;
@@ -628,18 +628,27 @@ static PetscErrorCode Tangent(HycoROM m, HycoStepAttempt *a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoBodiesSolveTangent(HycoBodiesPath w, PetscReal x[])
+{
+  PetscBLASInt lb, one = 1, info;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(w->bodies.bodies->inelastic->m, &lb));
+  /* J lies by rows, LAPACK has factored J^T. */
+  if (lb) LAPACKgetrs_("T", &lb, &one, w->J, &lb, w->pivot, x, &lb, &info);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* alpha += J^-1 r */
 static PetscErrorCode Advance(HycoROM m, PetscReal alpha[], HycoStepAttempt *a)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const PetscInt l = w->bodies.bodies->inelastic->m;
-  PetscBLASInt lb, one = 1, info;
 
   PetscFunctionBegin;
   if (a->why[0]) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscBLASIntCast(l, &lb));
-  /* J lies by rows, LAPACK has factored J^T; r becomes the step, so that Evaluate() must run before the next one. */
-  LAPACKgetrs_("T", &lb, &one, w->J, &lb, w->pivot, w->r, &lb, &info);
+  /* r becomes the step, so that Evaluate() must run before the next one. */
+  PetscCall(HycoBodiesSolveTangent(w, w->r));
   for (PetscInt k = 0; k < l; k++) alpha[k] += w->r[k];
   a->iterations++;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -669,7 +678,8 @@ static PetscErrorCode EvaluateOrRenew(HycoROM m, PetscReal t0, PetscReal t1, con
     }
     tangent = PETSC_TRUE;
   }
-  if (tangent && !a->law.failed && *before > PetscMax(w->path->rtol * w->norm, w->floor)) PetscCall(Tangent(m, a));
+  if (tangent && !a->law.failed && *before > PetscMax(w->path->rtol * w->norm, w->floor))
+    PetscCall(HycoBodiesTangent(m, a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -868,6 +878,41 @@ static PetscErrorCode SearchStates(HycoROM m, PetscReal t0, PetscReal t1, PetscR
     done = Agrees(m, alpha);
   }
   if (!done && !a->why[0]) HycoFormat(a->why, "contacts stick and slip in turn");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- derivatives of a step -- */
+
+PetscErrorCode HycoBodiesTakeSet(HycoROM m, const PetscReal Lambda[])
+{
+  PetscBool same;
+
+  PetscFunctionBegin;
+  PetscCall(ChooseSet(m, Lambda, &same));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesTakeMap(HycoROM m, const PetscReal alpha[], HycoStepAttempt *a)
+{
+  PetscFunctionBegin;
+  ((HycoBodiesPath)m->work)->fresh = PETSC_TRUE; /* that of these directions of slip */
+  PetscCall(TakeStates(m, alpha, a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesMoveSet(HycoBodiesPath w, const PetscReal q[], PetscReal dz[])
+{
+  const PetscInt p = w->bodies.bodies->p;
+  PetscReal *force, *work;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(dz, p + w->surface.n));
+  PetscCall(PetscMalloc2(w->n_set + 1, &force, p + 1, &work));
+  for (PetscInt i = 0; i < w->n_set; i++) force[i] = -q[p + w->set[i]];
+  for (PetscInt d = 0; d < p; d++) work[d] = -q[d];
+  PetscCall(Balance(w, p, 1, work, force, dz));
+  for (PetscInt i = 0; i < w->n_set; i++) dz[p + w->set[i]] = force[i];
+  PetscCall(PetscFree2(force, work));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -150,6 +150,7 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
   HycoBodiesAddStrains(&w->bodies, alpha, m->gamma);
   MoveAll(m);
   PetscCall(PetscArraycpy(w->accepted, m->U, m->fe->n_dof));
+  PetscCall(HycoBodiesLawsRecord(m, alpha));
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
   PetscCall(HycoTraceAdd(m, p->t));
   p->now.stored = a->law.stored;
@@ -283,9 +284,14 @@ static PetscErrorCode Stand(HycoROM m, PetscInt k, PetscInt listed, PetscBool *a
   PetscReal *z, size;
 
   PetscFunctionBegin;
+  if (w->path->flows) {
+    if (k >= 0 && !w->friction) PetscCall(Assemble(w->path, m->fe->mu, PETSC_FALSE));
+    PetscCall(HycoBodiesLawsStand(m, k, able));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   /* Models of elastic bodies that have unknowns of cells are of older files. */
-  *able = (PetscBool)(!w->path->flows && !w->bodies.bodies->inelastic->nd);
-  if (*able && w->friction) PetscCall(HycoBodiesAlongStand(m, w->friction, &w->bodies, k, able));
+  *able = (PetscBool)!w->bodies.bodies->inelastic->nd;
+  if (*able && w->friction) PetscCall(HycoBodiesAlongStand(m, w->friction, &w->bodies, k, NULL, able));
   if (!*able || k < 0 || w->friction) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(p + n + 1, &z));
   PetscCall(PetscArraycpy(z, w->motions + listed * p, p));
@@ -300,7 +306,10 @@ static PetscErrorCode Rest(HycoROM m, const PetscInt **row, PetscReal w[], Petsc
 
   PetscFunctionBegin;
   HycoBodiesWorkOnMotions(&o->bodies, w);
-  HycoBodiesAlongRest(o->friction, row, w + o->bodies.bodies->p, size);
+  if (o->friction)
+    HycoBodiesAlongRest(o->friction, row, w + o->bodies.bodies->p, size);
+  else
+    PetscCall(HycoBodiesLawsRest(m, row, w, size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -314,14 +323,31 @@ static PetscErrorCode Near(HycoROM m, const PetscReal mu[], PetscInt n, const Pe
     PetscCall(HycoBodiesAlongNear(m, o->friction, mu, contact, rows, z, point, w));
   else
     PetscCall(HycoBodiesNear(m, mu, n, contact, rows, z, point, w));
+  if (o->path->flows) PetscCall(HycoBodiesLawsBeside(m, mu, point));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode Along(HycoROM m, PetscInt parameter, const PetscReal weight[3], const PetscInt point[3],
                             const PetscReal q[], PetscReal dz[], PetscBool *regular)
 {
+  HycoBodiesPath o = (HycoBodiesPath)m->work;
+
   PetscFunctionBegin;
-  PetscCall(HycoBodiesAlongStep(((HycoBodiesPath)m->work)->friction, parameter, weight, point, q, dz, regular));
+  if (o->path->flows)
+    PetscCall(HycoBodiesLawsAlong(m, parameter, weight, point, q, dz, regular));
+  else
+    PetscCall(HycoBodiesAlongStep(o->friction, parameter, weight, point, q, dz, regular));
+  if (*regular && !o->path->flows) PetscCall(HycoBodiesAlongTake(o->friction, parameter, dz, regular));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Slope(HycoROM m, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
+                            const PetscInt point[2], const PetscReal dz[], const PetscBool modes[],
+                            const PetscBool dofs[], PetscReal dgamma[], PetscReal dU[])
+{
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesSlope(m, n, contact, weight, point, dz, modes, dofs, dgamma, dU));
+  if (((HycoBodiesPath)m->work)->path->flows) HycoBodiesLawsSlope(m, dU);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -517,6 +543,7 @@ static PetscErrorCode Reset(HycoROM m)
   PetscCall(PetscFree2(w->x, w->x0));
   HycoDestroyAll(&w->alpha, &w->L);
   PetscCall(HycoPathFree(&w->path));
+  PetscCall(HycoBodiesLawsDestroy(w));
   if (w->bodies.bodies) PetscCall(HycoBodiesReset(&w->bodies));
   PetscCall(HycoBodiesAlongDestroy(w->friction));
   PetscCall(HycoBodiesFrictionDestroy(&w->friction));
@@ -533,6 +560,7 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
   w->misfit = 0;
   HycoBodiesRestart(m); /* the same factors whatever was predicted before */
   if (w->friction) PetscCall(HycoBodiesFrictionBegin(w->friction));
+  PetscCall(HycoBodiesLawsBegin(m));
   PetscCall(HycoTraceFollow(m, w->path, mu));
   PetscCall(PetscStrncpy(m->prediction.method, w->friction ? HYCO_SOLVER_SEMISMOOTH : HycoNewtons[w->path->method],
                          sizeof(m->prediction.method)));
@@ -568,8 +596,7 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Derivatives of elastic paths are those of their steps, of others differences of whole paths (path_gradient.c); unknowns, residual and expand serve programs too. No estimate of its own: those of held-out paths
-   apply. */
+/* Unknowns, residual and expand serve programs too. No estimate of its own: those of held-out paths apply. */
 PetscErrorCode HycoBodiesTakePath(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "condensed bodies",
@@ -593,7 +620,7 @@ PetscErrorCode HycoBodiesTakePath(HycoROM m)
                                  .rest = Rest,
                                  .along = Along,
                                  .show = Show,
-                                 .slope = HycoBodiesSlope,
+                                 .slope = Slope,
                                  .expand = Expand,
                                  .features = Features,
                                  .view = View,

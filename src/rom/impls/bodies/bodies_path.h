@@ -5,6 +5,7 @@
 #include <hycobodies.h>
 #include <hycopath.h>
 
+typedef struct _n_HycoBodiesLaws *HycoBodiesLaws;
 typedef struct _n_HycoBodiesPath {
   struct _n_HycoBodiesWork bodies; /* the first, as in the model without a history */
   HycoPath path;
@@ -41,6 +42,7 @@ typedef struct _n_HycoBodiesPath {
   PetscBool always;         /* a new tangent in each iteration */
   PetscReal norm, floor;    /* of alpha and T^T s; of r: round-off */
   PetscReal *motions;       /* by listed time, and one more, x p: rigid motions x of the bodies there */
+  HycoBodiesLaws laws;      /* the path's steps, for derivatives (bodies_laws.c); NULL: none yet */
   PetscReal misfit;         /* of s in the span of the modes at the points, the largest of the listed times */
 } * HycoBodiesPath;
 
@@ -55,5 +57,26 @@ PetscErrorCode HycoBodiesMoveCells(HycoROM model, const PetscReal alpha[], const
 /* Newton's method on sets of contacts until one holds: alpha and the forces at t1 from those at t0; else a->why. */
 PetscErrorCode HycoBodiesSearch(HycoROM model, PetscReal t0, PetscReal t1, PetscReal alpha[], PetscReal Lambda[],
                                 HycoStepAttempt *a);
+/* For derivatives at a converged step (frictionless): the set of these forces; w->loose: it determines no motion. With
+   friction: the map of the forces at alpha. */
+PetscErrorCode HycoBodiesTakeSet(HycoROM model, const PetscReal Lambda[]);
+PetscErrorCode HycoBodiesTakeMap(HycoROM model, const PetscReal alpha[], HycoStepAttempt *a);
+/* Factors J at w->lost; x = J^-1 x. */
+PetscErrorCode HycoBodiesTangent(HycoROM model, HycoStepAttempt *a);
+PetscErrorCode HycoBodiesSolveTangent(HycoBodiesPath work, PetscReal x[]);
+/* dz, motions and forces by contact, from the change q of w at fixed forces. */
+PetscErrorCode HycoBodiesMoveSet(HycoBodiesPath work, const PetscReal q[], PetscReal dz[]);
+
+/* Derivatives of paths of bodies that deform inelastically (bodies_laws.c), as the ops `stand`, `rest`, `beside`, `along`
+   and `slope`; Record: of an accepted step; Begin: of a path. */
+PetscErrorCode HycoBodiesLawsBegin(HycoROM model);
+PetscErrorCode HycoBodiesLawsRecord(HycoROM model, const PetscReal alpha[]);
+PetscErrorCode HycoBodiesLawsStand(HycoROM model, PetscInt k, PetscBool *able);
+PetscErrorCode HycoBodiesLawsRest(HycoROM model, const PetscInt **row, PetscReal w[], PetscReal *size);
+PetscErrorCode HycoBodiesLawsBeside(HycoROM model, const PetscReal mu[], PetscInt point);
+PetscErrorCode HycoBodiesLawsAlong(HycoROM model, PetscInt parameter, const PetscReal weight[3],
+                                   const PetscInt point[3], const PetscReal q[], PetscReal dz[], PetscBool *regular);
+void HycoBodiesLawsSlope(HycoROM model, PetscReal dU[]);
+PetscErrorCode HycoBodiesLawsDestroy(HycoBodiesPath work);
 
 #endif

@@ -1244,24 +1244,27 @@ static void AddProduct(PetscInt l, PetscInt m, const PetscReal F[], const PetscR
   }
 }
 
-/* After HycoBodiesExpand(), which overwrites gamma. The rows of `fields` run over bodies, samples, turns and
-   modes, in this order. */
-void HycoBodiesAddStrains(HycoBodiesWork o, const PetscReal alpha[], PetscReal gamma[])
+/* The rows of `fields` run over bodies, samples, turns and modes, in this order. */
+void HycoBodiesAddStrainsOf(HycoBodiesWork o, PetscInt body, const PetscReal alpha[], PetscReal gamma[])
 {
   const HycoSubstructures b = o->bodies;
-  const PetscInt m = b->inelastic->m;
+  const HycoSubstructure *own = &b->body[body];
+  const PetscInt m = b->inelastic->m, turns = b->turn_start[body + 1] - b->turn_start[body];
   const PetscReal *F = b->inelastic->fields;
 
-  for (PetscInt k = 0; k < b->n; k++) {
-    const HycoSubstructure *own = &b->body[k];
-    const PetscInt turns = b->turn_start[k + 1] - b->turn_start[k];
+  for (PetscInt k = 0; k < body; k++)
+    F += (size_t)(b->body[k].n_samples * (b->turn_start[k + 1] - b->turn_start[k]) * b->body[k].l) * (size_t)m;
+  for (PetscInt j = 0; j < own->n_samples * turns; j++, F += (size_t)own->l * (size_t)m) {
+    PetscReal share = 0;
 
-    for (PetscInt j = 0; j < own->n_samples * turns; j++, F += (size_t)own->l * (size_t)m) {
-      PetscReal share = 0;
-
-      /* Fields are stored for a basis of turns G, since a vector field turns linearly with Q. */
-      for (PetscInt d = 0; d < 9; d++) share += b->G[9 * (b->turn_start[k] + j % turns) + d] * o->pose[k].Q[d];
-      AddProduct(own->l, m, F, alpha, share * o->weight[k][j / turns] / o->kappa[k], gamma + b->mode_start[k]);
-    }
+    /* Fields are stored for a basis of turns G, since a vector field turns linearly with Q. */
+    for (PetscInt d = 0; d < 9; d++) share += b->G[9 * (b->turn_start[body] + j % turns) + d] * o->pose[body].Q[d];
+    AddProduct(own->l, m, F, alpha, share * o->weight[body][j / turns] / o->kappa[body], gamma + b->mode_start[body]);
   }
+}
+
+/* After HycoBodiesExpand(), which overwrites gamma. */
+void HycoBodiesAddStrains(HycoBodiesWork o, const PetscReal alpha[], PetscReal gamma[])
+{
+  for (PetscInt k = 0; k < o->bodies->n; k++) HycoBodiesAddStrainsOf(o, k, alpha, gamma);
 }
