@@ -68,7 +68,7 @@ static void Make(int n, int p, int rank, unsigned long long *state, Problem *o)
 static PetscErrorCode Solve(const Problem *o, int *status, double *kkt, double *error)
 {
   char *memory;
-  double rest[3] = {0};
+  double rest[4] = {0};
   Work work;
   int its;
 
