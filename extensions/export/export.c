@@ -3,7 +3,8 @@
   gradients use: w = q + M z, and the values from which the outputs follow, are affine in z, and functions of the parameters are
   found for their coefficients (functions.c). The runtime that the file has is also compiled here: before anything is
   written, its predictions are compared with the model's. Of surfaces that move past each other z has the forces at the
-  places of the surfaces instead (travel.c): the search, which is no function of the parameters, is the program's own.
+  places of the surfaces instead (travel.c): the search, which is no function of the parameters, is the program's own. Of
+  bodies that flow z ends with the coefficients of their modes, and the values begin with the strains of their points (flow.c).
 */
 #include "flow.h"
 #include "travel.h"

@@ -196,13 +196,6 @@ PetscErrorCode HycoFlowsCreate(HycoROM m, HycoExportModel *out, HycoFlows *flows
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFlowsAlpha(HycoFlows f, PetscReal alpha[])
-{
-  PetscFunctionBegin;
-  PetscCall(HycoVecRead(f->path->alpha, f->n_modes, alpha));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoFlowsDestroy(HycoFlows *flows)
 {
   PetscFunctionBegin;

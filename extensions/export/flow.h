@@ -17,14 +17,13 @@ typedef struct {
   HycoROM m;
   HycoBodiesPath path;
   HycoFE outputs; /* borrowed; NULL: no output has cells */
-  PetscInt n_modes, n_points, n_settled, n_lost;
+  PetscInt n_modes, n_points, n_settled;
   FlowPoint *point;
 } * HycoFlows;
 /* After a prediction; *flows NULL: all bodies are elastic. Fails with what cannot be exported. Adds points and laws to out. */
 PetscErrorCode HycoFlowsCreate(HycoROM m, HycoExportModel *out, HycoFlows *flows);
 PetscErrorCode HycoFlowsDestroy(HycoFlows *flows);
-/* alpha of the last state; component `row` of the points' strains there. */
-PetscErrorCode HycoFlowsAlpha(HycoFlows flows, PetscReal alpha[]);
+/* Component `row` of the points' strains at the last state. */
 PetscReal HycoFlowsStrain(HycoFlows flows, PetscInt row);
 /* What a value loses by the inelastic strains: of the mean stresses of a cell of outputs, in which component c has the
    coefficient by[c]; of quantity k of the scene. */

@@ -22,9 +22,9 @@ static void place_flow(const Model *m, double **next, Work *o)
 
   o->alpha = take(next, l);
   o->alpha_at = take(next, l);
-  o->last_alpha = take(next, l);
   o->lack = take(next, l);
   o->step = take(next, l);
+  o->row_of_K = take(next, l);
   o->P = take(next, l * n);
   o->K = take(next, l * l);
   o->Z = take(next, l * n);
@@ -234,12 +234,12 @@ static void take_tangent(const Model *m, Work *o)
 
   for (size_t i = 0; i < l * l; i++) o->K[i] = i % (l + 1) == 0;
   for (size_t i = 0; i < (size_t)m->n_chosen * ns; i++) {
-    memset(o->last_alpha, 0, l * sizeof(double));
+    memset(o->row_of_K, 0, l * sizeof(double));
     for (size_t c = 0; c < ns; c++) {
-      if (o->softer[i * ns + c] != 0) add(l, o->softer[i * ns + c], o->slope + (i / ns * ns + c) * l, o->last_alpha);
+      if (o->softer[i * ns + c] != 0) add(l, o->softer[i * ns + c], o->slope + (i / ns * ns + c) * l, o->row_of_K);
     }
     for (size_t k = 0; k < l; k++) {
-      if (m->T[i * l + k] != 0) add(l, -m->T[i * l + k], o->last_alpha, o->K + k * l);
+      if (m->T[i * l + k] != 0) add(l, -m->T[i * l + k], o->row_of_K, o->K + k * l);
     }
   }
   factor_rows(l, o->K, o->pivot_of_K);

@@ -188,7 +188,7 @@ static int find_unknowns(const Model *m, Work *o, const double z[], int stick)
     double *D = o->D + 9 * k;
 
     law(m, o, k, data);
-    HycoCoulombDerivative(rows, data, o->from + p + first, D);
+    if (!stick) HycoCoulombDerivative(rows, data, o->from + p + first, D);
     for (int i = 0; i < rows; i++) {
       double size = 0;
 

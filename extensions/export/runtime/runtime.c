@@ -36,7 +36,7 @@ typedef struct {
   double t; /* the step's end */
   State s;  /* its begin, and then its end */
   /* Bodies that flow: see flow.c. P as A; by mode; with `softer`, of the chosen points; by point; q without alpha */
-  double *P, *alpha, *alpha_at, *last_alpha, *lack, *step, *K, *Z, *slope, *strain_at, *z_at, *q_elastic, *aside;
+  double *P, *alpha, *alpha_at, *lack, *step, *K, *row_of_K, *Z, *slope, *strain_at, *z_at, *q_elastic, *aside;
   double *softer, *strain, *elastic, *stress, *lost, *flowed, *size, *constant;
   double most_lack, increment; /* tolerance of lack; the largest of the inelastic strains */
   int *pivot_of_K, has_tangent, easy;
