@@ -35,6 +35,7 @@ typedef const char *HycoMaterialType;
   request are NULL. A nonlinear law may be called for its elastic tangent: strain and strain0 are then the same array. A
   linear law is called for its tangent only, without strains. Temperatures are NULL in a body without a temperature.
 */
+/* -- begin: in exported models too -- */
 typedef struct {
   PetscInt n, dim, n_strain;
   const PetscReal *const *constant; /* [j][i]: value of the j-th declared constant at point i */
@@ -56,6 +57,7 @@ typedef struct {
   PetscInt failed;       /* out: a point where the law has no solution; -1 by default */
   const char *why;       /* out: the reason, "the yield stress is negative" */
 } HycoMaterialPoints;
+/* -- end: in exported models too -- */
 
 typedef struct _HycoMaterialOps *HycoMaterialOps;
 struct _HycoMaterialOps {

@@ -3,24 +3,30 @@
   gradients use: w = q + M z, and the values from which the outputs follow, are affine in z, and functions of the parameters are
   found for their coefficients (functions.c). The runtime that the file has is also compiled here: before anything is
   written, its predictions are compared with the model's. Of surfaces that move past each other z has the forces at the
-  places of the surfaces instead (travel.c): the search, which is no function of the parameters, is the program's own.
+  places of the surfaces instead (travel.c): the search, which is no function of the parameters, is the program's own. Of
+  bodies that flow z ends with the coefficients of their modes, and the values begin with the strains of their points (flow.c).
 */
+#include "flow.h"
 #include "travel.h"
-#include <hycobodies.h>
 #include <hycoextensions.h>
-#include <hycomaterialimpl.h>
+#include <hycoflow.h>
 #include <hycoquantities.h>
 #include <math.h>
 #include <string.h>
 #include <time.h>
 
+#define FLOWS 1
+#define SLIPS 1
 #include "runtime/runtime.c"
 #include <hycocoulomb.h>
 #include "runtime/paths.c"
+#include "runtime/flow.c"
 
 #define EXACT          2e-11 /* error of a function at points that were not fitted */
 #define CHECKED        64    /* points at which the runtime is compared with the model */
-#define AGREES         1e-9  /* difference there, of an output's largest value */
+#define AGREES         1e-9  /* difference there, of an output's largest value; of bodies that flow: */
+#define FLOWS_AGREE    1e-8
+#define NEWTON_RTOL    1e-12 /* of both, as what Newton's method leaves adds up over the steps of a path */
 #define PLACES         6     /* at which expressions in space are functions of the parameters */
 #define MOST           6000000
 #define MOST_ITEMS     3000
@@ -36,7 +42,7 @@
 
 /* A value: of an output, of a contact's force along an axis, of a stress in a cell, of a displacement, of a travel. */
 typedef struct {
-  enum { QUANTITY, FORCE, CELL, NODE, TRAVEL, COEFFICIENT, AREA } from;
+  enum { QUANTITY, FORCE, CELL, NODE, TRAVEL, COEFFICIENT, AREA, STRAIN } from;
   PetscInt index, axis,
       group; /* group: the output to which it belongs; from n_outputs on those of a travel; -1: of contacts */
   PetscReal coefficient[6]; /* of a cell's stresses */
@@ -47,9 +53,11 @@ typedef struct {
   HycoROM m;
   HycoScene s;
   HycoTravel travel;          /* NULL: no surface moves */
+  HycoFlows flows;            /* NULL: no body flows */
   PetscInt p, n, k, *contact; /* motions and contacts of the model's problem; the contacts with a row, or all places; */
   PetscInt *first;            /* with friction rows instead; by contact of the model: its first one; NULL: its number */
-  PetscReal *z, *unit;        /* p + n; their sizes */
+  PetscInt l;                 /* modes of bodies that flow */
+  PetscReal *z, unit[3];      /* p + n + l; their sizes */
   PetscReal *w;
   PetscInt n_rows, ny, n_groups, *group;
   HycoAtoms atoms;
@@ -109,7 +117,13 @@ static PetscErrorCode FindAreas(Export *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y = (w, values) at mu for z: motions, then the contacts of e->contact in units of e->unit; NULL: 0. */
+/* The size of entry i of z, of which there are p + k + l. */
+static PetscReal UnitOf(const Export *e, PetscInt i)
+{
+  return e->unit[i < e->p ? 0 : i < e->p + e->k ? 1 : 2];
+}
+
+/* y = (w, values) at mu for z: motions, the contacts of e->contact, alpha, in units of e->unit; NULL: 0. */
 static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[], PetscReal y[])
 {
   HycoROM m = e->m;
@@ -120,12 +134,12 @@ static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[]
   PetscInt n_sigma;
 
   PetscFunctionBegin;
-  PetscCall(PetscArrayzero(e->z, e->p + e->n));
-  for (PetscInt i = 0; z && i < e->p + e->k; i++) {
-    const PetscInt at = i < e->p ? i : e->p + e->contact[i - e->p];
+  PetscCall(PetscArrayzero(e->z, e->p + e->n + e->l));
+  for (PetscInt i = 0; z && i < e->p + e->k + e->l; i++) {
+    const PetscInt at = i < e->p ? i : i < e->p + e->k ? e->p + e->contact[i - e->p] : e->n - e->k + i;
 
     /* Contacts without a row stay 0. */
-    e->z[at] = z[i] * e->unit[i < e->p ? 0 : 1];
+    e->z[at] = z[i] * UnitOf(e, i);
   }
   /* Order: the residual sets the parameters, expand the fields of z, from which the outputs follow. */
   if (e->travel)
@@ -150,6 +164,7 @@ static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[]
              : r->from == TRAVEL ? HycoTravelValue(e->travel, r->index)
                                  : 0;
     if (r->from == AREA) *value = e->area[r->index];
+    if (r->from == STRAIN) *value = HycoFlowsStrain(e->flows, r->index);
     if (r->from == COEFFICIENT)
       PetscCall(HycoExprEval(e->s->contact[m->pairs.contact[r->index]]->friction, mu, 1,
                              m->fe->X + 3 * m->pairs.slave[r->index], value));
@@ -374,6 +389,8 @@ static PetscErrorCode FindOutputs(Export *e)
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(e->m->pairs.n + 1, &e->area));
+  for (PetscInt i = 0; i < e->out.m.n_points * e->out.m.n_strain; i++)
+    ADD_ROW(e, (Row){.from = STRAIN, .index = i, .group = -2});
   e->out.m.areas = (int)e->n_rows;
   for (PetscInt i = 0, k = 0; i < e->k && !e->travel; i++) {
     while (k + 1 < e->m->pairs.n && (e->first ? e->first[k + 1] : k + 1) <= e->contact[i]) k++;
@@ -465,7 +482,7 @@ static PetscErrorCode FindProblem(Export *e, const PetscReal mu[])
   PetscUseTypeMethod(m, unknowns, &e->p, &e->n, NULL);
   if (e->travel) e->n = e->travel->bodies->bodies->ns;
   n = (size_t)(e->p + e->n);
-  PetscCall(PetscMalloc4(n + 1, &e->z, n + 1, &e->w, 2, &e->unit, e->n + 1, &e->contact));
+  PetscCall(PetscCalloc3(e->p + e->n + e->l + 1, &e->z, n + 1, &e->w, e->n + 1, &e->contact));
   if (e->travel)
     HycoTravelUnknowns(e->travel, e->z);
   else
@@ -473,7 +490,7 @@ static PetscErrorCode FindProblem(Export *e, const PetscReal mu[])
   /* Sizes of motions and forces at the solution, by which probing stays above round-off. */
   e->unit[0] = e->unit[1] = 0;
   for (PetscInt i = 0; i < e->p + e->n; i++) e->unit[i >= e->p] = PetscMax(e->unit[i >= e->p], PetscAbsReal(e->z[i]));
-  for (PetscInt i = 0; i < 2; i++) e->unit[i] = e->unit[i] > 0 ? e->unit[i] : 1;
+  for (PetscInt i = 0; i < 3; i++) e->unit[i] = e->unit[i] > 0 ? e->unit[i] : 1;
   for (PetscInt i = 0; e->travel && i < e->n; i++) e->contact[e->k++] = i;
   if (e->travel) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc4(n * n + 1, &M, e->n + 1, &all, e->n + 1, &flexibility, e->n + 1, &moves));
@@ -522,8 +539,7 @@ static PetscErrorCode Scatter(const Export *e, PetscInt n, PetscReal **mu)
     const PetscInt i = k / n_var, p = k % n_var;
     const PetscReal share = (PetscReal)(i + 1) * PetscSqrtReal((PetscReal)(2 + 3 * p));
 
-    (*mu)[k] =
-        p < n_par ? at[i * n_par + p] : e->s->lo[p] + (e->s->hi[p] - e->s->lo[p]) * (share - PetscFloorReal(share));
+    (*mu)[k] = p < n_par ? at[i * n_par + p] : HycoVariableAt(e->s, p, share - PetscFloorReal(share));
   }
   PetscCall(HycoSamplesDestroy(&samples));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -547,13 +563,13 @@ static PetscErrorCode Sample(Export *e, PetscInt n, PetscInt fixed, Samples *o)
   for (PetscInt i = 0; fixed >= 0 && i < n; i++) o->mu[i * n_par + fixed] = (e->s->lo[fixed] + e->s->hi[fixed]) / 2;
   PetscCall(PetscMalloc1((size_t)n * (size_t)e->ny + 1, &o->y));
   PetscCall(PetscMalloc1(2 * (size_t)n * (size_t)e->ny + 1, &o->added));
-  PetscCall(PetscMalloc1(e->p + e->k + 1, &z));
+  PetscCall(PetscMalloc1(e->p + e->k + e->l + 1, &z));
   for (PetscInt i = 0; i < n && !ierr; i++) {
     PetscReal *y = o->y + (size_t)i * (size_t)e->ny, *added = o->added + 2 * (size_t)i * (size_t)e->ny;
 
     ierr = Probe(e, o->mu + i * n_par, NULL, y);
     for (PetscInt j = 0; j < 2 && !ierr; j++) {
-      Irregular(e->p + e->k, j, z);
+      Irregular(e->p + e->k + e->l, j, z);
       ierr = Probe(e, o->mu + i * n_par, z, added + j * e->ny);
       /* y is affine in z: the difference is M z, and T z of the values. */
       for (PetscInt r = 0; r < e->ny; r++) added[j * e->ny + r] -= y[r];
@@ -713,6 +729,9 @@ static PetscErrorCode Refuse(Export *e)
     HycoFormat(of, "%s", row < e->p ? "the loads on bodies that contact alone holds" : "the gaps");
   else if (e->row[at].from == TRAVEL)
     HycoFormat(of, "the stiffness or the turn of a body");
+  else if (e->row[at].group < 0)
+    HycoFormat(of,
+               e->row[at].from == STRAIN ? "the strain of a body that flows" : "an area or a coefficient of friction");
   else
     HycoFormat(of, "the output %s", e->out.name[e->row[at].group]);
   for (PetscInt p = 0; p < e->s->n_parameters && !e->travel; p++) { /* there it takes long */
@@ -835,7 +854,7 @@ static PetscErrorCode AddMatrix(Export *e, const PetscReal mu[], const PetscReal
   PetscReal largest;
 
   PetscFunctionBegin;
-  PetscCall(PetscArrayzero(e->z, e->p + e->n));
+  PetscCall(PetscArrayzero(e->z, e->p + e->n + e->l));
   if (e->travel) {
     PetscCall(HycoTravelMotions(e->travel, mu, M)); /* k x p */
   } else {
@@ -855,28 +874,31 @@ static PetscErrorCode AddMatrix(Export *e, const PetscReal mu[], const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same of the values: by unit forces and motions, one after the other. T: functions x rows x (p + k). */
+/* The same of the values, by units of all z, one after the other, and P. T: functions x rows x (p + k + l). */
 static PetscErrorCode AddValues(Export *e, const PetscReal mu[], const PetscReal share[], PetscReal T[])
 {
-  const PetscInt n = e->p + e->k;
+  const PetscInt n = e->p + e->k, all = n + e->l;
   PetscReal *z, *y, *y0;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc3(n + 1, &z, e->ny, &y, e->ny, &y0));
+  PetscCall(PetscCalloc3(all + 1, &z, e->ny, &y, e->ny, &y0));
   /* Results count friction where there is a normal force alone. */
   for (PetscInt c = 0; e->first && c < e->k; c++) z[e->p + c] = e->out.m.normal[c];
   PetscCall(Probe(e, mu, z, y0));
   /* n probes at each point of the response: the values need no Jacobian of their own. */
-  for (PetscInt c = 0; c < n && e->n_rows; c++) {
+  for (PetscInt c = 0; c < all && e->n_rows; c++) {
     z[c] += 1;
     PetscCall(Probe(e, mu, z, y));
     z[c] -= 1;
     for (PetscInt r = 0; r < e->n_rows; r++) {
-      const PetscReal change = (y[n + r] - y0[n + r]) / e->unit[c >= e->p];
+      const PetscReal change = (y[n + r] - y0[n + r]) / UnitOf(e, c);
 
       for (PetscInt f = 0; f < e->response.n; f++)
-        T[((size_t)f * (size_t)e->n_rows + (size_t)r) * (size_t)n + (size_t)c] += share[f] * change;
+        T[((size_t)f * (size_t)e->n_rows + (size_t)r) * (size_t)all + (size_t)c] += share[f] * change;
     }
+    for (PetscInt i = 0; c >= n && i < e->response.n * e->k; i++)
+      e->out.m.P[(i / e->k * e->l + c - n) * e->k + i % e->k] +=
+          share[i / e->k] * (y0[e->p + i % e->k] - y[e->p + i % e->k]) / UnitOf(e, c);
   }
   PetscCall(PetscFree3(z, y, y0));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -908,7 +930,7 @@ static PetscErrorCode DropRounding(Export *e)
 static PetscErrorCode KeepTerms(Export *e, const PetscInt place[], const PetscReal T[])
 {
   Model *o = &e->out.m;
-  const size_t n = (size_t)(e->p + e->k);
+  const size_t n = (size_t)(e->p + e->k + e->l);
   const PetscInt n_f = e->response.n;
   PetscReal *size;
   size_t *from = NULL;
@@ -921,7 +943,7 @@ static PetscErrorCode KeepTerms(Export *e, const PetscInt place[], const PetscRe
     for (PetscInt f = 0; f < n_f; f++) {
       size[f] = 0;
       for (size_t c = 0; c < n; c++)
-        size[f] = PetscMax(size[f], e->response.size[f] * e->unit[c >= (size_t)e->p] *
+        size[f] = PetscMax(size[f], e->response.size[f] * UnitOf(e, (PetscInt)c) *
                                         PetscAbsReal(T[((size_t)f * (size_t)e->n_rows + (size_t)r) * n + c]));
       most = PetscMax(most, size[f]);
     }
@@ -963,10 +985,10 @@ static PetscErrorCode TakeTables(const HycoScene s, Model *o)
 static PetscErrorCode Fill(Export *e)
 {
   HycoExportModel *o = &e->out;
-  const size_t k = (size_t)e->k, n = (size_t)(e->p + e->k), f = (size_t)e->response.n;
+  const size_t k = (size_t)e->k, n = (size_t)(e->p + e->k), all = n + (size_t)e->l, f = (size_t)e->response.n;
   /* As a real: the product may exceed PetscInt. It bounds the file's size and the memory below. */
   const PetscReal square = e->travel ? 0 : (PetscReal)k * (PetscReal)k / 2;
-  const PetscReal numbers = (PetscReal)f * (square + (PetscReal)e->n_rows * (PetscReal)n) + 1 +
+  const PetscReal numbers = (PetscReal)f * (square + (PetscReal)e->n_rows * (PetscReal)all) + 1 +
                             (e->travel ? HycoTravelNumbers(e->travel) : 0);
   const size_t triangle = e->travel ? 0 : k * (k + 1) / 2, matrix = e->travel ? k * (size_t)e->p : n * n;
   PetscInt *place;
@@ -1001,8 +1023,9 @@ static PetscErrorCode Fill(Export *e)
   for (PetscInt i = 0; i < e->response.n; i++) o->m.stiffness[i] = (int)place[e->base.n + i];
   PetscCall(PetscCalloc1(f * triangle + 1, &o->m.W));
   PetscCall(PetscCalloc1(f * (size_t)e->p * k + 1, &o->m.A));
-  PetscCall(PetscCalloc5(f * (size_t)e->s->n_variables + 1, &point, f * f + 1, &inverse, f * (size_t)e->n_rows * n + 1,
-                         &T, matrix + 1, &M, f + 1, &share));
+  PetscCall(PetscCalloc1(f * (size_t)e->l * k + 1, &o->m.P));
+  PetscCall(PetscCalloc5(f * (size_t)e->s->n_variables + 1, &point, f * f + 1, &inverse,
+                         f * (size_t)e->n_rows * all + 1, &T, matrix + 1, &M, f + 1, &share));
   PetscCall(ChoosePoints(e, point, inverse));
   for (PetscInt i = 0; i < e->response.n; i++) {
     for (PetscInt j = 0; j < e->response.n; j++) share[j] = inverse[(size_t)j * f + (size_t)i];
@@ -1103,7 +1126,7 @@ static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
   for (PetscInt k = 0; k < n; k++) {
     const PetscReal scale = ScaleOf(n, e->out.name, most, k);
 
-    HycoCheck(worst[k] <= AGREES * scale,
+    HycoCheck(worst[k] <= (e->flows ? FLOWS_AGREE : AGREES) * scale,
               "export: the output %s of the program differs from the model's by %.1e of its largest value; the forces "
               "may not be unique",
               e->out.name[k], (double)(worst[k] / scale));
@@ -1131,6 +1154,35 @@ static void SetRanges(HycoScene s)
   }
 }
 
+/* What the stresses lose: of the values that are elastic ones. The unit of alpha: strains of it are of the size of those of loads
+   at the end of the path. */
+static PetscErrorCode ScaleAlpha(Export *e)
+{
+  PetscReal *mu, *z, *y, *more, size[2] = {0, 0};
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < e->n_rows; i++) {
+    const Row *r = &e->row[i];
+
+    if (r->from == CELL) PetscCall(HycoFlowsLoseStress(e->flows, i, r->index, r->coefficient, &e->out));
+    if (r->from == QUANTITY) PetscCall(HycoFlowsLoseQuantity(e->flows, i, r->index, &e->out));
+  }
+  PetscCall(Scatter(e, 1, &mu));
+  PetscCall(PetscCalloc3(e->p + e->k + e->l, &z, e->ny, &y, e->ny, &more));
+  PetscCall(Probe(e, mu, z, y));
+  for (PetscInt i = 0; i < e->l; i++) z[e->p + e->k + i] = 1;
+  PetscCall(Probe(e, mu, z, more));
+  for (PetscInt i = e->p + e->k; i < e->ny; i++) {
+    if (e->row[i - e->p - e->k].from != STRAIN) continue;
+    size[0] = PetscMax(size[0], PetscAbsReal(y[i]));
+    size[1] = PetscMax(size[1], PetscAbsReal(more[i] - y[i]));
+  }
+  if (size[0] > 0 && size[1] > 0) e->unit[2] = size[0] / size[1];
+  PetscCall(PetscFree3(z, y, more));
+  PetscCall(PetscFree(mu));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A prediction in the middle of the ranges comes first: the operations need a model that is set up. */
 static PetscErrorCode Prepare(Export *e)
 {
@@ -1141,17 +1193,19 @@ static PetscErrorCode Prepare(Export *e)
   PetscFunctionBegin;
   HycoCheck(!strcmp(m->model->type, "bodies"),
             "a model of type %s cannot be exported; train one with -hyco_model_type bodies", m->model->type);
-  HycoCheck(!e->s->n_times || !((HycoSubstructures)m->model->data)->inelastic->m,
-            "hyco export: bodies of this model creep or yield; programs are written of elastic bodies; hyco predict, C "
-            "and Python predict its paths");
   SetRanges(e->s);
   for (PetscInt p = 0; p < e->s->n_parameters; p++) mu[p] = (e->s->lo[p] + e->s->hi[p]) / 2;
   PetscCall(HycoROMPredict(m, e->s->n_parameters, mu));
   if (e->s->n_times) HycoSceneSetTime(e->s, mu, e->s->times[e->s->n_times - 1], mu);
   PetscCall(HycoTravelCreate(m, &e->out, &e->travel));
+  e->l = e->s->n_times ? ((HycoSubstructures)m->model->data)->inelastic->m : 0;
   PetscCall(FindProblem(e, mu));
   e->out.m.tolerance = e->s->n_times ? PATH_TOLERANCE : m->solver->rtol;
+  if (e->s->n_times)
+    e->out.m.least = ((HycoBodiesPath)m->work)->path->smallest * (e->s->times[e->s->n_times - 1] - e->s->times[0]);
   PetscCall(HycoROMMeasureQuantities(m, &(HycoPrediction){0}));
+  PetscCall(HycoFlowsCreate(m, &e->out, &e->flows));
+  e->out.m.newton_rtol = PetscMin(e->out.m.newton_rtol, NEWTON_RTOL);
   PetscCall(FindOutputs(e));
   e->travel_row = e->n_rows;
   for (PetscInt b = 0; b < e->out.m.n_slip; b++) {
@@ -1174,18 +1228,20 @@ static PetscErrorCode Prepare(Export *e)
   for (PetscInt i = 0; i < e->n_weights; i++) PetscCall(HycoAtomsAddWeight(e->s, e->weight[i], &e->atoms));
   e->ny = e->p + e->k + e->n_rows;
   places = 2 + e->out.m.n_outputs + (e->travel ? e->travel->n_values : 0);
-  e->n_groups = places + (e->travel ? e->travel->bodies->bodies->n : 1); /* of areas and coefficients of friction */
+  e->n_groups = places + (e->travel ? e->travel->bodies->bodies->n : 2); /* areas, coefficients of friction; strains */
   PetscCall(PetscMalloc1(2 * e->ny + 1, &e->group));
   for (PetscInt r = 0; r < 2 * e->ny; r++) {
     const PetscInt at = r % e->ny;
 
     if (at >= e->p + e->k)
-      e->group[r] = e->row[at - e->p - e->k].group < 0 ? places : 2 + e->row[at - e->p - e->k].group;
+      e->group[r] = e->row[at - e->p - e->k].group < 0 ? places - 1 - e->row[at - e->p - e->k].group
+                                                       : 2 + e->row[at - e->p - e->k].group;
     else if (at >= e->p && e->travel)
       e->group[r] = places + HycoBodiesAt(e->travel->bodies->bodies, at - e->p);
     else
       e->group[r] = at >= e->p;
   }
+  if (e->l) PetscCall(ScaleAlpha(e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -1205,7 +1261,8 @@ static PetscErrorCode Build(Export *e)
   e->out.n_states = (PetscInt)state_size(&e->out.m);
   PetscCall(PetscMalloc1(e->out.n_states, &e->state));
   PetscCall(PetscMalloc1(work_size(&e->out.m) + 1, &memory));
-  HycoFinally(Compare(e, &e->out.m, memory), PetscCall(PetscFree(memory)));
+  e->m->trace.rtol = NEWTON_RTOL;
+  HycoFinally(Compare(e, &e->out.m, memory), PetscCall(PetscFree(memory)); e->m->trace.rtol = 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -1228,7 +1285,8 @@ static PetscErrorCode ExportC(HycoROM m, const char path[], char **description)
   PetscCall(HycoExportFitFree(&e.base));
   PetscCall(HycoExportFitFree(&e.response));
   PetscCall(HycoTravelDestroy(&e.travel));
-  if (e.z) PetscCall(PetscFree4(e.z, e.w, e.unit, e.contact));
+  PetscCall(HycoFlowsDestroy(&e.flows));
+  if (e.z) PetscCall(PetscFree3(e.z, e.w, e.contact));
   for (PetscInt i = 0; i < e.n_weights; i++) PetscCall(PetscFree(e.weight[i]));
   HycoFreeAll(&e.first, &e.state, &e.weight, &e.group, &e.atoms.atom, &e.atoms.code.text, &e.row, &e.area);
   PetscCall(HycoExportModelFree(&e.out, e.s));

@@ -23,6 +23,8 @@ typedef struct {
    *at: where it begins, -1: it is no expression of names that are known; *uses: it has a parameter; *space: x, y or z. */
 PetscErrorCode HycoParse(HycoScene scene, const char text[], const PetscReal x[3], const PetscReal minus[3],
                          HycoCode *code, PetscInt *at, PetscBool *uses, PetscBool *space);
+/* The text of an entry with its body's temperature in place of the word; the caller frees it. */
+PetscErrorCode HycoExportHeat(HycoScene scene, const char key[], const char text[], char **hot);
 
 /* An expression of the scene in the parameters alone, at a fixed place, or what it changes from there to another (change).
    Two weights of samples are never multiplied. */
@@ -35,6 +37,9 @@ typedef struct {
   HycoAtom *atom;
   HycoCode code;
 } HycoAtoms;
+
+/* The value of a variable at a share of its range; of the time at one of the listed intervals. */
+PetscReal HycoVariableAt(HycoScene scene, PetscInt p, PetscReal share);
 
 /* A function of the parameters: see product(). */
 typedef struct {

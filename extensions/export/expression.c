@@ -226,3 +226,34 @@ PetscErrorCode HycoParse(HycoScene scene, const char text[], const PetscReal x[3
   if (space) *space = p.space;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+/* A parameter of that name comes first. */
+PetscErrorCode HycoExportHeat(HycoScene s, const char key[], const char text[], char **hot)
+{
+  static const char word[] = "temperature";
+  const char *heat = NULL;
+  HycoText t = {0};
+
+  PetscFunctionBegin;
+  for (PetscInt b = 0; b < s->n_bodies; b++) {
+    const size_t n = strlen(s->body[b].name);
+
+    if (!strncmp(key, "body_", 5) && !strncmp(key + 5, s->body[b].name, n) && key[5 + n] == '_' &&
+        s->body[b].temperature)
+      heat = HycoExportEntry(s, HycoExprKey(s->body[b].temperature));
+  }
+  for (PetscInt k = 0; k < s->n_variables; k++) heat = strcmp(s->parameter[k], word) ? heat : NULL;
+  PetscCall(HycoTextAdd(&t, " "));
+  while (*text) {
+    size_t n = 0;
+
+    while (isalnum((unsigned char)text[n]) || text[n] == '_') n++;
+    if (heat && n == strlen(word) && !strncmp(text, word, n))
+      PetscCall(HycoTextAdd(&t, "(%s)", heat));
+    else
+      PetscCall(HycoTextAdd(&t, "%.*s", (int)PetscMax(n, 1), text));
+    text += PetscMax(n, 1);
+  }
+  *hot = t.text;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -32,6 +32,16 @@ static void Deflate(PetscInt n, const PetscReal q[], PetscReal v[])
 
 /* -- atoms -- */
 
+PetscReal HycoVariableAt(HycoScene s, PetscInt p, PetscReal share)
+{
+  const PetscReal at = share * (PetscReal)(s->n_times - 1);
+  const PetscInt j = (PetscInt)at;
+
+  if (p != s->n_parameters || s->n_times < 2) return s->lo[p] + (s->hi[p] - s->lo[p]) * share;
+  /* What a function does in a short interval is seen as well as in a long one. */
+  return s->times[j] + (s->times[j + 1] - s->times[j]) * (at - (PetscReal)j);
+}
+
 static PetscReal ValueOf(const HycoAtoms *atoms, const HycoAtom *a, const PetscReal mu[])
 {
   return value_of(atoms->code.text + a->code, mu, NULL);
@@ -84,7 +94,7 @@ static PetscErrorCode IsSum(HycoScene s, const HycoAtoms *all, const HycoAtom *o
       for (PetscInt p = 0; p < s->n_variables; p++) {
         const PetscReal at = (PetscReal)(i + 1) * 0.61803398874989485 * (1 + 0.75487766624669276 * (PetscReal)p);
 
-        mu[p] = s->lo[p] + (s->hi[p] - s->lo[p]) * (at - PetscFloorReal(at));
+        mu[p] = HycoVariableAt(s, p, at - PetscFloorReal(at));
       }
       v[i] = k ? ValueOf(all, k <= n ? &atom[k - 1] : one, mu) : 1;
     }
@@ -133,25 +143,36 @@ PetscErrorCode HycoAtomsAddWeight(HycoScene s, const char text[], HycoAtoms *ato
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The atoms of an entry, whose text is that of HycoExportHeat(). */
+static PetscErrorCode AddEntry(HycoScene s, const char key[], const char text[], PetscBool travels, PetscInt n,
+                               const PetscReal x[], HycoAtoms *atoms)
+{
+  const PetscBool map = (PetscBool)(strstr(key, "_map_") != NULL);
+  PetscInt at;
+  PetscBool uses, space;
+
+  PetscFunctionBegin;
+  PetscCall(HycoParse(s, text, x, NULL, &atoms->code, &at, &uses, &space));
+  if (at < 0 || !uses) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt c = 0; space && map && c < 3; c++) PetscCall(Add(s, key, text, x, c, PETSC_FALSE, PETSC_FALSE, atoms));
+  for (PetscInt i = 0; !(map && travels) && i < (space ? n : 1); i++)
+    PetscCall(Add(s, key, text, x + 3 * i, -1, space, PETSC_FALSE, atoms));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoAtomsFind(HycoScene s, PetscBool travels, PetscInt n, const PetscReal x[], HycoAtoms *atoms)
 {
-  PetscInt at;
-  PetscBool uses, space, map;
-
   PetscFunctionBegin;
   for (PetscInt p = 0; p < s->n_variables; p++)
     PetscCall(Add(s, s->parameter[p], s->parameter[p], x, -1, PETSC_FALSE, PETSC_FALSE, atoms));
   for (PetscInt k = 0; k < s->n_entries; k++) {
+    char *text;
+
     /* Entries that cannot change K, F, B or D, and constants, which occur within other entries. */
     if (!strncmp(s->key[k], "output_", 7) || !strncmp(s->key[k], "scene_", 6) || !strncmp(s->key[k], "constant_", 9))
       continue;
-    PetscCall(HycoParse(s, s->value[k], x, NULL, &atoms->code, &at, &uses, &space));
-    if (at < 0 || !uses) continue;
-    map = (PetscBool)(strstr(s->key[k], "_map_") != NULL);
-    for (PetscInt c = 0; space && map && c < 3; c++)
-      PetscCall(Add(s, s->key[k], s->value[k], x, c, PETSC_FALSE, PETSC_FALSE, atoms));
-    for (PetscInt i = 0; !(map && travels) && i < (space ? n : 1); i++)
-      PetscCall(Add(s, s->key[k], s->value[k], x + 3 * i, -1, space, PETSC_FALSE, atoms));
+    PetscCall(HycoExportHeat(s, s->key[k], s->value[k], &text));
+    HycoFinally(AddEntry(s, s->key[k], text, travels, n, x, atoms), PetscCall(PetscFree(text)));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

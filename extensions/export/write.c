@@ -9,7 +9,7 @@
 
 /* By extension.cmake: what the library and a program share, and the parts of both files that are alike but for the prefix. */
 extern const char HycoExport_runtime[], HycoExport_header_h[], HycoExport_predict_h[], HycoExport_step_h[],
-    HycoExport_calls_c[], HycoExport_predict_c[], HycoExport_step_c[];
+    HycoExport_flow[], HycoExport_calls_c[], HycoExport_predict_c[], HycoExport_step_c[];
 
 #define ADD(...) PetscCall(HycoTextAdd(__VA_ARGS__))
 
@@ -124,7 +124,7 @@ typedef struct {
   void *own;
 } Array;
 
-#define MOST_ARRAYS 48
+#define MOST_ARRAYS 56
 #define OWN(array)  (array), &(array)
 
 static int List(HycoExportModel *e, HycoScene s, Array list[MOST_ARRAYS])
@@ -134,7 +134,7 @@ static int List(HycoExportModel *e, HycoScene s, Array list[MOST_ARRAYS])
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_places, of = (size_t)m->n_stiffness, slip = (size_t)m->n_slip,
                terms = (size_t)m->n_terms, points = (size_t)(f->nq * f->nf), nodes = (size_t)f->n_nodes,
                dofs = nodes * (size_t)f->dim, tables = (size_t)m->n_tables,
-               rows = tables ? (size_t)m->table[tables] : 0;
+               rows = tables ? (size_t)m->table[tables] : 0, modes = (size_t)m->n_modes, flowing = (size_t)m->n_flowing;
   const Array all[] = {
       {"double", "_lo", (size_t)s->n_parameters, 0, s->lo, NULL},
       {"double", "_hi", (size_t)s->n_parameters, 0, s->hi, NULL},
@@ -148,7 +148,7 @@ static int List(HycoExportModel *e, HycoScene s, Array list[MOST_ARRAYS])
       {"double", "A", of * p * n, 0, OWN(m->A)},
       {"int", "value", terms, 0, OWN(m->value)},
       {"int", "factor", terms, 0, OWN(m->factor)},
-      {"double", "term", terms * (p + n), 0, OWN(m->term)},
+      {"double", "term", terms * (p + n + modes), 0, OWN(m->term)},
       {"int", "contact", (size_t)e->n_contact, 0, OWN(m->contact)},
       {"double", "weight", (size_t)e->n_weights, 0, OWN(m->weight)},
       {"Output", "output", (size_t)m->n_outputs, 6, OWN(m->output)},
@@ -160,6 +160,14 @@ static int List(HycoExportModel *e, HycoScene s, Array list[MOST_ARRAYS])
       {"int", "table", tables ? tables + 1 : 0, 0, OWN(m->table)},
       {"double", "table_t", rows, 0, OWN(m->table_t)},
       {"double", "table_value", rows, 0, OWN(m->table_value)},
+      {"Flowing", "flowing", flowing, 4, OWN(m->flowing)},
+      {"int", "constant", flowing * SLOTS, 0, OWN(m->constant)},
+      {"double", "point", 3 * (size_t)m->n_points, 0, OWN(m->point)},
+      {"double", "P", of * modes * n, 0, OWN(m->P)},
+      {"double", "T", (size_t)(m->n_chosen * m->n_strain) * modes, 0, OWN(m->T)},
+      {"int", "lost_value", (size_t)m->n_lost, 0, OWN(m->lost_value)},
+      {"int", "lost_at", (size_t)m->n_lost, 0, OWN(m->lost_at)},
+      {"double", "lost_share", (size_t)m->n_lost, 0, OWN(m->lost_share)},
       {"double", "surfaces.w", (size_t)f->nq, 0, OWN(f->w)},
       {"double", "surfaces.N", points, 0, OWN(f->N)},
       {"double", "surfaces.dN", 2 * points, 0, OWN(f->dN)},
@@ -254,32 +262,23 @@ static PetscErrorCode WriteProgram(HycoExportModel *e, HycoScene s, const char p
   const struct {
     const char *name;
     int value;
-  } size[] = {SIZE(n_parameters),
-              SIZE(n_atoms),
-              SIZE(n_functions),
-              SIZE(n_motions),
-              SIZE(n_places),
-              SIZE(n_stiffness),
-              SIZE(n_values),
-              SIZE(n_terms),
-              SIZE(n_outputs),
-              SIZE(n_contacts),
-              SIZE(n_blocks),
-              SIZE(areas),
-              SIZE(n_slip),
-              SIZE(n_tables),
-              SIZE(surfaces.dim),
-              SIZE(surfaces.n_nodes),
-              SIZE(surfaces.nf),
-              SIZE(surfaces.nq),
-              SIZE(surfaces.n_searches),
+  } size[] = {SIZE(n_parameters),     SIZE(n_atoms),      SIZE(n_functions),
+              SIZE(n_motions),        SIZE(n_places),     SIZE(n_stiffness),
+              SIZE(n_values),         SIZE(n_terms),      SIZE(n_outputs),
+              SIZE(n_contacts),       SIZE(n_blocks),     SIZE(areas),
+              SIZE(n_slip),           SIZE(n_tables),     SIZE(n_modes),
+              SIZE(n_points),         SIZE(n_settled),    SIZE(n_chosen),
+              SIZE(n_strain),         SIZE(n_flowing),    SIZE(n_lost),
+              SIZE(newton_most),      SIZE(surfaces.dim), SIZE(surfaces.n_nodes),
+              SIZE(surfaces.nf),      SIZE(surfaces.nq),  SIZE(surfaces.n_searches),
               SIZE(surfaces.n_facets)};
 
   PetscFunctionBegin;
   ADD(t,
       "/* Written by hyco export; %s declares what it offers. C99, with libc and libm alone. */\n#include \"%s\"\n\n",
       header, header);
-  ADD(t, "%s\n/* -- the model -- */\n\n", HycoExport_runtime);
+  ADD(t, "#define FLOWS %d\n#define SLIPS %d\n\n%s%s\n/* -- the model -- */\n\n", m->n_modes > 0, m->n_slip > 0,
+      HycoExport_runtime, m->n_modes ? HycoExport_flow : "");
   PetscCall(WriteNames(t, s, prefix, "parameter", s->n_parameters, s->parameter, NULL));
   PetscCall(WriteNames(t, NULL, prefix, "output", m->n_outputs, e->name, e->unit));
   for (int k = 0; k < n; k++) PetscCall(WriteArray(t, &list[k], prefix));
@@ -290,6 +289,8 @@ static PetscErrorCode WriteProgram(HycoExportModel *e, HycoScene s, const char p
       ADD(t, "  .%s = model_%s,\n", list[k].name,
           strchr(list[k].name, '.') ? strchr(list[k].name, '.') + 1 : list[k].name);
   }
+  ADD(t, "  .newton_rtol = %.17g,\n  .most_increment = %.17g,\n  .least = %.17g,\n", m->newton_rtol, m->most_increment,
+      m->least);
   ADD(t, "  .surfaces.around = %.17g,\n  .tolerance = %.17g};\n\n", m->surfaces.around, m->tolerance);
   PetscCall(AddNamed(t, HycoExport_calls_c, prefix));
   PetscCall(AddNamed(t, s->n_times ? HycoExport_step_c : HycoExport_predict_c, prefix));

@@ -8,6 +8,7 @@
 
 #include <hycomaterialimpl.h>
 
+/* -- begin: in exported models too -- */
 #define HYCO_FLOW_CONSTANTS 6
 
 /* Data of a point and a step, passed to the functions of a rule. */
@@ -35,6 +36,11 @@ typedef struct {
   /* Its integral from plastic0 to plastic0 + dp. */
   PetscReal (*yield_integral)(const HycoFlowPoint *, PetscReal dp);
 } HycoFlowRule;
+/* -- end: in exported models too -- */
+extern const HycoFlowRule HycoFlowJ2, HycoFlowNorton, HycoFlowStrainHardening, HycoFlowLimbackAndersson;
+
+/* The law at points whose constants are young, poisson and the rule's own; `failed` and `why` are set by the caller. */
+void HycoFlowUpdate(const HycoFlowRule *rule, HycoMaterialPoints *points);
 
 /* In a law's create(): after HycoElasticDeclare() for young and poisson, and its own constants; the rule must be static. */
 PetscErrorCode HycoFlowEnd(HycoMaterial material, const HycoFlowRule *rule);

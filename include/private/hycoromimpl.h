@@ -371,6 +371,9 @@ PetscBool HycoResultantsSuffice(HycoROM model, HycoResultants resultants);
 /* The bodies from whose balance quantity q follows, if contact acts on them from outside; NULL otherwise. Borrowed. */
 const PetscBool *HycoResultantsPushed(HycoROM model, HycoResultants resultants, PetscInt q);
 const PetscBool *HycoROMGetPushed(HycoROM model, PetscInt q);
+/* Whether a quantity is a reaction that follows from balance. */
+PetscBool HycoResultantsFollow(HycoROM model, HycoResultants resultants, PetscInt q);
+PetscBool HycoROMFollowsFromBalance(HycoROM model, PetscInt q);
 /* Sets the quantities that follow from forces Lambda of a prediction and the loads at mu[]. NULL-safe. */
 PetscErrorCode HycoResultantsSet(HycoROM model, HycoResultants resultants, const PetscReal mu[],
                                  const PetscReal Lambda[], PetscReal value[]);

@@ -9,6 +9,7 @@
 */
 #include <hycoflow.h>
 
+/* -- begin: in exported models too -- */
 #define ITERATIONS 500  /* every eighth is a bisection: ten times more than any bracket needs */
 #define BLOCK      32   /* points evaluated together */
 #define CLOSE      1e-8 /* after a Newton step of this relative size the error is of the order of its square */
@@ -43,11 +44,11 @@ typedef struct {
   PetscReal q, creep, slope;          /* creep strain of the step at q, and its derivative */
   Bracket b;
   PetscBool done;
-} Work;
+} Radial;
 
 /* The first iterate: q_tr, or, if creep there is too fast, a step towards the root of the tangent power law. Under
    strong creep q_tr is far from the root, and Newton's method from there takes many steps. */
-static void StartCreep(const HycoFlowRule *rule, Work *w)
+static void StartCreep(const HycoFlowRule *rule, Radial *w)
 {
   const PetscReal trial = w->trial;
 
@@ -77,7 +78,7 @@ static void StartCreep(const HycoFlowRule *rule, Work *w)
 /* An iteration for q + H creep(q) = q_tr, on the logarithms of H creep and q_tr - q where creep dominates: a power
    law is nearly linear there. After the last iteration creep is updated along its tangent, and the slope along a
    power law: the remaining error is of second order in the step. */
-static void IterateCreep(const HycoFlowRule *rule, Work *w)
+static void IterateCreep(const HycoFlowRule *rule, Radial *w)
 {
   const PetscReal old = w->q, rest = w->trial - old, excess = w->H * w->creep - rest;
   PetscReal newton = old - excess / (1 + w->H * w->slope);
@@ -112,7 +113,7 @@ typedef struct {
 /* Solves q = Y(plastic0 + (q_tr - q) / H - creep(q)) between the yield stress before the step and f->q, the solution
    for creep alone. Creep and yielding together: q is the only unknown, since plastic flow follows from the trial
    stress. */
-static PetscReal SolveYield(const HycoFlowRule *rule, const Work *w, PetscReal yield, Flow *f, PetscReal *slope,
+static PetscReal SolveYield(const HycoFlowRule *rule, const Radial *w, PetscReal yield, Flow *f, PetscReal *slope,
                             PetscReal *hardening)
 {
   Bracket b = {yield, f->q, 0};
@@ -137,7 +138,7 @@ static PetscReal SolveYield(const HycoFlowRule *rule, const Work *w, PetscReal y
 
 /* The flow of a point after the solution for creep alone. Slope: derivative of the flow by q_tr, for the consistent
    tangent. */
-static Flow Solve(const HycoFlowRule *rule, const Work *w)
+static Flow Solve(const HycoFlowRule *rule, const Radial *w)
 {
   Flow f = {w->q, w->creep, 0, 0};
   PetscReal slope = w->slope, hardening = 0, yield = -1;
@@ -217,7 +218,7 @@ static void Energies(const HycoFlowRule *rule, const HycoFlowPoint *p, HycoMater
 
 /* The trial state of point i. State: inelastic strain, accumulated creep, accumulated plastic strain. Constants 0
    and 1 are Young's modulus and Poisson's ratio; in 1D the stress alone counts. */
-static void Begin(const HycoMaterialPoints *m, PetscInt i, Work *w)
+static void Begin(const HycoMaterialPoints *m, PetscInt i, Radial *w)
 {
   const PetscInt ns = m->n_strain;
   const PetscReal young = m->constant[0][i], poisson = m->constant[1][i], G = young / (2 * (1 + poisson));
@@ -239,7 +240,7 @@ static void Begin(const HycoMaterialPoints *m, PetscInt i, Work *w)
 
 /* Sets point i at the end of the step. Stress, state and tangent from the equivalent stress, radially along the
    trial deviator. */
-static void Finish(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscInt i, const Work *w)
+static void Finish(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscInt i, const Radial *w)
 {
   const PetscInt ns = m->n_strain;
   const PetscReal young = m->constant[0][i], poisson = m->constant[1][i], *strain = m->strain + i * ns;
@@ -286,12 +287,12 @@ static void Take(const HycoFlowRule *rule, const HycoMaterialPoints *m, PetscInt
 static void UpdateBlock(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscInt first, PetscInt n)
 {
   const PetscInt ns = m->n_strain;
-  Work work[BLOCK];
+  Radial work[BLOCK];
   PetscInt left = 0, active[BLOCK];
 
   for (PetscInt k = 0; k < n; k++) {
     const PetscInt i = first + k;
-    Work *w = &work[k];
+    Radial *w = &work[k];
     const char *why = NULL;
 
     Take(rule, m, i, &w->p);
@@ -327,11 +328,16 @@ static void UpdateBlock(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscIn
 }
 
 /* Blocks bound the stack, and keep the interleaved points in cache. */
+void HycoFlowUpdate(const HycoFlowRule *rule, HycoMaterialPoints *m)
+{
+  for (PetscInt i = 0; i < m->n; i += BLOCK) UpdateBlock(rule, m, i, PetscMin(BLOCK, m->n - i));
+}
+/* -- end: in exported models too -- */
+
 static PetscErrorCode Update(HycoMaterial material, HycoMaterialPoints *m)
 {
   PetscFunctionBegin;
-  for (PetscInt i = 0; i < m->n; i += BLOCK)
-    UpdateBlock((const HycoFlowRule *)material->data, m, i, PetscMin(BLOCK, m->n - i));
+  HycoFlowUpdate((const HycoFlowRule *)material->data, m);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

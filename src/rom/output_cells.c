@@ -885,6 +885,11 @@ const PetscBool *HycoROMGetPushed(HycoROM m, PetscInt q)
   return m->output_cells ? HycoResultantsPushed(m, m->output_cells->resultants, q) : NULL;
 }
 
+PetscBool HycoROMFollowsFromBalance(HycoROM m, PetscInt q)
+{
+  return (PetscBool)(m->output_cells && HycoResultantsFollow(m, m->output_cells->resultants, q));
+}
+
 void HycoROMGetOutputFields(HycoROM m, const PetscReal *u[], const PetscReal *sigma[])
 {
   *u = m->output_cells ? m->output_cells->u : NULL;

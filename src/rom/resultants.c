@@ -147,6 +147,11 @@ const PetscBool *HycoResultantsPushed(HycoROM m, HycoResultants r, PetscInt q)
   return r && m->model->scene->quantity[q].kind == HYCO_QUANTITY_REACTION && r->pushed[q] ? Bodies(m, r, q) : NULL;
 }
 
+PetscBool HycoResultantsFollow(HycoROM m, HycoResultants r, PetscInt q)
+{
+  return (PetscBool)(r && m->model->scene->quantity[q].kind == HYCO_QUANTITY_REACTION && Bodies(m, r, q));
+}
+
 /* One quantity that does not follow makes the sums over supports necessary. */
 PetscBool HycoResultantsSuffice(HycoROM m, HycoResultants r)
 {

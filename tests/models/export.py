@@ -1,4 +1,4 @@
-"""hyco export: C99 programs of models of bodies in 2D, 3D and with an axis, with floating bodies, gaps, loads and moduli, and of their paths with friction: they
+"""hyco export: C99 programs of models of bodies in 2D, 3D and with an axis, with floating bodies, gaps, loads and moduli, and of their paths with friction, creep and yield: they
 compile without a warning, have the model's results in two threads at once, say what is outside the ranges; what cannot be exported is named in one line."""
 import os
 import subprocess
@@ -149,6 +149,32 @@ output: {T: {friction: x, contact: joint}, U: {friction: y, contact: joint}, W: 
 """
 # The same body without friction, on its supports
 LIFTED = HELD.replace(', friction: "m*(1 + 0.2*x)"', '').replace('traction:', 'fixed: {side: {x: 0}}\ntraction:').replace('T: {friction: x, contact: plane}, W: {friction: work}, ', '')
+# HELD of a fixed size, which creeps
+CREEPING = HELD.replace(', soft, size]', ', soft]').replace(', size: {range: [0.9, 1.1]}', '').replace(
+    'young: 1000/soft, poisson: 0.3, map: {x: size*x, y: size*y}', 'law: norton, young: 1000/soft, poisson: 0.3, rate: 1e-4*soft, exponent: 2')
+# 3D, with friction: two laws of creep, heat that varies in space and in time, unloading
+HEATED = """
+scene: {mesh: round.msh, parameters: [q, push], unit: {length: mm, force: N, stress: MPa}}
+parameter: {q: {range: [0, 10]}, push: {range: [0.5, 1.5]}}
+body:
+  low: {law: limback_andersson, young: 8e4, poisson: 0.3, temperature: "640+4*q*min(t, 1)+5*x", reference_temperature: 293, expansion: 5e-6}
+  high: {law: strain_hardening, young: 2e5-50*temperature, poisson: 0.3, temperature: 600+q, rate: 1e-9, exponent: 2, time_exponent: 0.4}
+fixed: {base: {x: 0, y: 0, z: 0}, top: {x: 0, y: 0, z: "-0.001*push*r"}}
+contact: {joint: {type: surface, slave: face, master: back, friction: 0.3}}
+history: {times: [0, 1, 10, 50, 60], tables: {r: [[0, 1], [1, 2], [50, 2], [60, 0.5]]}}
+output: {S: {max: mises, group: back}, M: {mean: sigma_zz, group: back}, R: {reaction: x, group: top}, W: {friction: work}}
+"""
+# 2D, without: yield, unloading and yield again
+YIELDING = """
+scene: {mesh: held.msh, parameters: [press, soft]}
+parameter: {press: {range: [1, 2]}, soft: {range: [0.8, 1.2]}}
+body: {block: {law: j2, young: 1000, poisson: 0.3, yield: 0.9*soft + 0.1*y, hardening: 50}}
+fixed: {side: {x: 0}}
+traction: {top: {x: 0.1*press*v, y: -press*v}}
+contact: {plane: {group: base, normal: {y: -1}, gap: "0.0001*(x - 1)^2"}}
+history: {times: [0, 1, 2, 3, 4], tables: {v: [[0, 0], [1, 1], [2, 0.2], [3, 1.1], [4, 0]]}}
+output: {P: {max: contact_pressure}, peak: {max: mises, group: top}, R: {reaction: x, group: side}, first: {min: sigma_xx, group: block}}
+"""
 
 
 def grids(folder):
@@ -273,7 +299,7 @@ class Export(Case):
         self.assertEqual(run.returncode, 0, run.stderr)
         return float(run.stdout.split('largest difference from the model ')[1].split()[0])
 
-    def judge_path(self, name, scene, points, level='-O0'):
+    def judge_path(self, name, scene, points, level='-O0', most=1e-9, tight=()):
         """The program of a model of paths against predict at each listed time, beside corners of the ranges; returns the outputs by name."""
         with open(self.path(name + '.yaml'), 'w', encoding='ascii') as f:
             f.write(scene)
@@ -284,11 +310,11 @@ class Export(Case):
         names, rows = self.ran(name, points)
         self.assertFalse(rows[:, 0].any())
         self.assertLess(rows[:, 1].max(), 1e-10)
-        history = [self.hyco('predict', '-model', name + '.h5', '-mu', ','.join(map(repr, p)))['history'] for p in points]
+        history = [self.hyco('predict', '-model', name + '.h5', '-mu', ','.join(map(repr, p)), *tight)['history'] for p in points]
         outputs = {of: np.concatenate([h['outputs'][of] for h in history]) for of in history[0]['outputs']}
         for of, values in outputs.items():
             self.assertGreater(abs(values).max(), 0, of)
-            self.assertLessEqual(abs(rows[:, 2 + names.index(of)] - values).max(), 1e-9 * abs(values).max(), of)
+            self.assertLessEqual(abs(rows[:, 2 + names.index(of)] - values).max(), most * abs(values).max(), of)
         return {of: rows[:, 2 + k] for k, of in enumerate(names)}
 
     def test_paths(self):
@@ -301,6 +327,16 @@ class Export(Case):
         self.assertGreater(turned['W'][4], 0)
         lifted = self.judge_path('lifted', LIFTED, ((0.4, 1.3, 0.22, 1.7, 1.02),))
         self.assertGreater(lifted['N'].max(), 0)
+
+    def test_flows(self):
+        """Bodies that creep, two laws in 3D with friction, or yield, again after unloading: the steps of predict, its outputs to 1e-8. No variables."""
+        grids(self.folder)
+        tight = {'most': 1e-8, 'tight': ('-hyco_newton_rtol', '1e-12')}  # what Newton's method leaves adds up over the steps
+        creeps = self.judge_path('heated', HEATED, ((7.0, 1.4),), **tight)
+        self.assertLess(creeps['S'][3], 0.9 * creeps['S'][1])
+        yields = self.judge_path('yielding', YIELDING, ((1.9, 0.83),), **tight)
+        self.assertGreater(yields['peak'][4], 1e-2 * yields['peak'].max())  # what is left without loads
+        self.assertNotRegex(subprocess.run(['nm', self.path('yielding.o')], capture_output=True, text=True, check=True).stdout, r' [bBC] ')
 
     def test_floating(self):
         """A block that contact alone holds, under a load that varies in space with the parameters, heated; each kind of output; a state outside the ranges is said."""
@@ -368,7 +404,7 @@ class Export(Case):
         with open(self.path('flows.yaml'), 'w', encoding='ascii') as f:
             f.write(HELD.replace('young: 1000/soft', 'law: norton, young: 1000, rate: 1e-4*soft, exponent: 2').replace('times: [0, 1, 2, 3, 4, 5]', 'times: [0, 0.5, 1]'))
         self.hyco('train', '-scene', 'flows.yaml', '-hyco_model_type', 'bodies', '-scatter', '2', '-hyco_validation', '0', '-model', 'flows.h5', '-hyco_snapshots', 'flows')
-        for words, args in ((('bodies', 'creep', 'elastic'), ('-model', 'flows.h5', '-c', 'no.c')), (('under', 'gap', 'travel'), ('-model', 'given.h5', '-c', 'no.c')),
+        for words, args in ((('block', 'creeps', 'shape'), ('-model', 'flows.h5', '-c', 'no.c')), (('under', 'gap', 'travel'), ('-model', 'given.h5', '-c', 'no.c')),
                             (('hybrid', 'bodies'), ('-model', 'hybrid.h5', '-c', 'no.c')), (('-c', '.c'), ('-model', 'given.h5', '-c', 'no.txt')),
                             (('-c',), ('-model', 'given.h5'))):
             run = self.run_raw('export', *args)

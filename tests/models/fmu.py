@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 
 from common import HYCO, PATIENCE, SOURCE, Case
-from export import HELD, PAD, grids
+from export import CREEPING, PAD, grids
 
 WARNING, DISCARD, ERROR = 1, 2, 3
 FMPY = os.environ.get('HYCO_FMPY', sys.executable)
@@ -79,9 +79,9 @@ class FMU(Case):
             cls.table = {key: np.array(t[key]) for key in t}
         grids(cls.folder)
         with open(cls.path('held.yaml'), 'w', encoding='ascii') as f:
-            f.write(HELD)
+            f.write(CREEPING)
         cls.hyco('train', '-scene', 'held.yaml', '-hyco_model_type', 'bodies', '-scatter', '2', '-hyco_validation', '0', '-hyco_snapshots', 'held', '-model', 'held.h5')
-        cls.point = {'m': 0.4, 'press': 1.3, 'push': 0.22, 'soft': 1.7, 'size': 0.93}
+        cls.point = {'m': 0.4, 'press': 1.3, 'push': 0.22, 'soft': 1.7}
         cls.history = cls.hyco('predict', '-model', 'held.h5', '-mu', ','.join(map(repr, cls.point.values())))['history']['outputs']
         for name in ('pad', 'held'):
             made = subprocess.run([sys.executable, os.path.join(SOURCE, 'scripts', 'fmu'), name + '.h5', name + '.fmu'], cwd=cls.folder, env={**os.environ, 'HYCO': HYCO},
@@ -116,7 +116,7 @@ class FMU(Case):
         of.lib.fmi3FreeInstance(of.instance)
 
     def test_path(self):
-        """A path with friction: the state goes from step to step, inputs belong to the next one, a step without a solution leaves all as it was."""
+        """A path with friction and creep: the state goes from step to step, inputs belong to the next one, a step without a solution leaves all as it was."""
         of = Importer(self.path('held'))
         self.assertEqual(of.start(self.point), [0, 0])
         for k in range(6):
@@ -125,7 +125,7 @@ class FMU(Case):
             status, values = of.get()
             self.assertEqual(status, 0)
             for name, path in self.history.items():
-                self.assertLessEqual(abs(values[name] - path[k]), 1e-9 * max(map(abs, path)), (name, k))
+                self.assertLessEqual(abs(values[name] - path[k]), 1e-8 * max(map(abs, path)), (name, k))
         self.assertEqual(of.set({'push': 0.5}), 0)  # outside the ranges
         self.assertEqual(of.get(), (0, values))
         self.assertEqual(of.step(5, -1), (ERROR, 5))
@@ -142,7 +142,7 @@ class FMU(Case):
             self.skipTest('HYCO_FMPY names no Python with fmpy')
         run = subprocess.run([FMPY, '-c', SIMULATE, 'pad.fmu', json.dumps(self.point)], cwd=self.folder, capture_output=True, text=True, timeout=60 * PATIENCE, check=True)
         push, kkt, work = json.loads(run.stdout.splitlines()[-1])
-        np.testing.assert_allclose(work, self.history['W'], rtol=1e-9)
+        np.testing.assert_allclose(work, self.history['W'], rtol=1e-8)
         self.assertEqual(len(push), 5)
         self.assertLess(max(kkt), 1e-10)
         again = self.hyco('predict', '-model', 'pad.h5', '-mu_lift', '0', '-mu_soft', '1.2', '-mu_weight', '0', '-mu_press', '0.04')

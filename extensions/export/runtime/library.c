@@ -12,7 +12,11 @@
 #define PetscMin(a, b)   ((a) < (b) ? (a) : (b))
 #define PetscMax(a, b)   ((a) < (b) ? (b) : (a))
 #define PetscAbsReal     fabs
+#define PETSC_INFINITY   HUGE_VAL
 #define PetscSqrtReal    sqrt
+#define PetscExpReal     exp
+#define PetscLogReal     log
+#define PetscPowReal     pow
 
 typedef double PetscReal;
 typedef int PetscInt;

@@ -54,19 +54,27 @@ typedef struct {
   DATA double *drawn;      /* the nodes as drawn, n_nodes x 3 */
 } Surfaces;
 
+/* Expressions of a body that flows: the constants of its law, then these. */
+enum { TEMPERATURE = 8, EXPANSION, REFERENCE, SLOTS };
+
+/* Points first .. first + n - 1 of a body that flows: the rule of its law; alike: all have the expressions of the first one. */
+typedef struct {
+  int rule, first, n, alike;
+} Flowing;
+
 typedef struct {
   int n_parameters, n_atoms, n_functions, n_motions, n_places, n_stiffness, n_values, n_terms, n_outputs;
   int n_contacts, n_blocks;  /* n_places contacts, and no blocks, unless surfaces move */
   int areas;                 /* of contacts: the first of their values, unless surfaces move */
   int n_slip, n_tables;      /* blocks of contacts with friction, with the others; tables of a history */
-  double tolerance;          /* of the KKT residual */
+  double tolerance, least;   /* of the KKT residual; the smallest step in time */
   DATA double *code;         /* expressions */
   DATA int *atom, *function; /* the expressions of the parameters, in code; n_functions x 4: see product() */
   DATA double *offset;       /* n_motions + n_places + n_values rows of n_functions: w and the values for z = 0 */
   DATA int *stiffness;       /* functions by which the next two are multiplied, n_stiffness of each */
   DATA double *W, *A;        /* lower triangle of n_places rows, where there are no blocks; n_motions x n_places */
   DATA int *value, *factor;  /* of n_terms: the value to which it adds, and its function */
-  DATA double *term;         /* (n_motions + n_places) x n_terms */
+  DATA double *term;         /* (n_motions + n_places + n_modes) x n_terms */
   DATA Output *output;
   DATA int *contact;
   DATA double *weight;
@@ -77,13 +85,24 @@ typedef struct {
   DATA int *normal;            /* by row: it is one; NULL: all are */
   DATA int *table;             /* by table: its first row, with the end; rows: */
   DATA double *table_t, *table_value;
+  /* Bodies that flow: their modes; points with laws, those whose increments bound a step, those that give alpha, each part of
+     the one before; components of their strains, which are the first values, point by point; what follows. */
+  int n_modes, n_points, n_settled, n_chosen, n_strain, n_flowing, n_lost, newton_most;
+  double newton_rtol, most_increment;
+  DATA Flowing *flowing;
+  DATA int *constant;             /* by these, SLOTS each: the expressions in code, -1: 0 */
+  DATA double *point, *P, *T;     /* n_points x 3; like A, n_modes x n_places; n_chosen x n_strain x n_modes */
+  DATA int *lost_value, *lost_at; /* of n_lost: the value that lacks a share of a component of what a stress has lost */
+  DATA double *lost_share;
 } Model;
 
 /* What a step leaves for the next; of doubles alone, in the caller's memory. */
 typedef struct {
-  double *taken, *t, *t_before, *mu; /* steps so far; times of the last two; parameters of the last */
-  double *z, *before;                /* motions and forces of the last; forces of the one before */
-  double *place, *work;              /* by row: of tangents, how far they are from where they began; by block */
+  double *taken, *t, *t_before, *dt,
+      *mu;                /* steps so far; times of the last two; size of the next, 0: any; parameters */
+  double *z, *before;     /* motions and forces of the last; forces of the one before */
+  double *place, *work;   /* by row: of tangents, how far they are from where they began; by block */
+  double *alpha, *flowed; /* n_modes; of the laws, by point */
 } State;
 
 #endif

@@ -1,5 +1,5 @@
 /*
-  Paths in time, of elastic bodies; a prediction without a history is a step from rest. A step with friction is w = q + M z as in runtime.c, with rows for the tangents of a
+  Paths in time; a prediction without a history is a step from rest. A step with friction is w = q + M z as in runtime.c, with rows for the tangents of a
   contact after that of its normal, whose w is the slip of the step: q has where the tangents were before. With Coulomb's
   projection P of the library, F(z) = z - P(z - rho w) = 0 is solved by Newton's method with a search along its steps.
 */
@@ -8,7 +8,8 @@ static size_t state_size(const Model *m)
 {
   const size_t n = m->n_slip ? (size_t)m->n_contacts : 0, p = m->n_slip ? (size_t)m->n_motions : 0;
 
-  return 3 + (size_t)m->n_parameters + p + 3 * n + (size_t)m->n_slip;
+  return 4 + (size_t)m->n_parameters + p + 3 * n + (size_t)(m->n_slip + m->n_modes) +
+         (size_t)m->n_points * (size_t)(m->n_strain + 2);
 }
 
 static State state_of(const Model *m, double *from)
@@ -19,11 +20,14 @@ static State state_of(const Model *m, double *from)
   s.taken = take(&from, 1);
   s.t = take(&from, 1);
   s.t_before = take(&from, 1);
+  s.dt = take(&from, 1);
   s.mu = take(&from, (size_t)m->n_parameters);
   s.z = take(&from, p + n);
   s.before = take(&from, n);
   s.place = take(&from, n);
   s.work = take(&from, (size_t)m->n_slip);
+  s.alpha = take(&from, (size_t)m->n_modes);
+  s.flowed = take(&from, (size_t)m->n_points * (size_t)(m->n_strain + 2));
   return s;
 }
 
@@ -57,6 +61,52 @@ static void place_path(const Model *m, double **next, Work *o)
   o->saved = take(next, state_size(m));
 }
 
+#if SLIPS || FLOWS
+/* Lower and upper factor with exchanged rows; an unknown without a pivot is 0. */
+static void factor_rows(size_t n, double J[], int pivot[])
+{
+  double most = 0;
+
+  for (size_t i = 0; i < n * n; i++) most = fmax(most, fabs(J[i]));
+  for (size_t k = 0; k < n; k++) {
+    double *row = J + k * n;
+    size_t best = k;
+
+    for (size_t i = k + 1; i < n; i++) {
+      if (fabs(J[i * n + k]) > fabs(J[best * n + k])) best = i;
+    }
+    pivot[k] = (int)best;
+    for (size_t j = 0; best != k && j < n; j++) {
+      const double kept = row[j];
+
+      row[j] = J[best * n + j];
+      J[best * n + j] = kept;
+    }
+    if (!(fabs(row[k]) > 1e-14 * most)) row[k] = HUGE_VAL;
+    for (size_t i = k + 1; i < n; i++) {
+      double *of = J + i * n;
+
+      if (of[k] == 0) continue;
+      of[k] /= row[k];
+      add(n - k - 1, -of[k], row + k + 1, of + k + 1);
+    }
+  }
+}
+
+static void solve_rows(size_t n, const double J[], const int pivot[], double x[])
+{
+  for (size_t k = 0; k < n; k++) {
+    const double kept = x[k];
+
+    x[k] = x[pivot[k]];
+    x[pivot[k]] = kept;
+  }
+  for (size_t k = 0; k < n; k++) x[k] -= dot(k, J + k * n, x);
+  for (size_t k = n; k-- > 0;) x[k] = (x[k] - dot(n - k - 1, J + k * n + k + 1, x + k + 1)) / J[k * n + k];
+}
+#endif
+
+#if SLIPS
 /* w = q + M z. */
 static void slack(const Model *m, Work *o, const double z[], double w[])
 {
@@ -138,7 +188,7 @@ static int find_unknowns(const Model *m, Work *o, const double z[], int stick)
     double *D = o->D + 9 * k;
 
     law(m, o, k, data);
-    HycoCoulombDerivative(rows, data, o->from + p + first, D);
+    if (!stick) HycoCoulombDerivative(rows, data, o->from + p + first, D);
     for (int i = 0; i < rows; i++) {
       double size = 0;
 
@@ -155,49 +205,6 @@ static int find_unknowns(const Model *m, Work *o, const double z[], int stick)
   return count;
 }
 
-/* Lower and upper factor with exchanged rows; an unknown without a pivot is 0. */
-static void factor_rows(size_t n, double J[], int pivot[])
-{
-  double most = 0;
-
-  for (size_t i = 0; i < n * n; i++) most = fmax(most, fabs(J[i]));
-  for (size_t k = 0; k < n; k++) {
-    double *row = J + k * n;
-    size_t best = k;
-
-    for (size_t i = k + 1; i < n; i++) {
-      if (fabs(J[i * n + k]) > fabs(J[best * n + k])) best = i;
-    }
-    pivot[k] = (int)best;
-    for (size_t j = 0; best != k && j < n; j++) {
-      const double kept = row[j];
-
-      row[j] = J[best * n + j];
-      J[best * n + j] = kept;
-    }
-    if (!(fabs(row[k]) > 1e-14 * most)) row[k] = HUGE_VAL;
-    for (size_t i = k + 1; i < n; i++) {
-      double *of = J + i * n;
-
-      if (of[k] == 0) continue;
-      of[k] /= row[k];
-      add(n - k - 1, -of[k], row + k + 1, of + k + 1);
-    }
-  }
-}
-
-static void solve_rows(size_t n, const double J[], const int pivot[], double x[])
-{
-  for (size_t k = 0; k < n; k++) {
-    const double kept = x[k];
-
-    x[k] = x[pivot[k]];
-    x[pivot[k]] = kept;
-  }
-  for (size_t k = 0; k < n; k++) x[k] -= dot(k, J + k * n, x);
-  for (size_t k = n; k-- > 0;) x[k] = (x[k] - dot(n - k - 1, J + k * n + k + 1, x + k + 1)) / J[k * n + k];
-}
-
 /* The block of a row. */
 static int block_of(const Model *m, int row)
 {
@@ -207,32 +214,26 @@ static int block_of(const Model *m, int row)
   return k;
 }
 
-/* In o->aimed the solution on the pieces of P at y, from z, by the residual there, which takes round-off away. */
-static void aim(const Model *m, Work *o, const double z[], int stick)
+/* The matrix of the unknowns on the pieces of P at y, factored; returns their number, and `aimed` as find_unknowns(). */
+static size_t factor_pieces(const Model *m, Work *o, const double z[], int stick)
 {
   const int p = m->n_motions;
   const size_t n = (size_t)m->n_contacts, count = (size_t)find_unknowns(m, o, z, stick);
 
-  slack(m, o, o->aimed, o->trial_w);
   for (size_t a = 0; a < count; a++) {
     const int r = o->unknown[a] - p, k = r < 0 ? 0 : block_of(m, r), rows = m->row[k + 1] - m->row[k];
     double *J = o->J + a * count;
 
-    if (r < 0) { /* a motion: w = 0 */
-      for (size_t b = 0; b < count; b++)
-        J[b] = o->unknown[b] < p ? 0 : o->rho[p + r] * o->A[(size_t)(p + r) * n + (size_t)(o->unknown[b] - p)];
-      o->rhs[a] = -o->rho[p + r] * o->trial_w[p + r];
-      continue;
+    for (size_t b = 0; b < count; b++) {
+      const int s = o->unknown[b] - p;
+
+      J[b] = r >= 0 ? a == b : s < 0 ? 0 : o->rho[p + r] * o->A[(size_t)(p + r) * n + (size_t)s];
     }
-    for (size_t b = 0; b < count; b++) J[b] = a == b;
-    o->rhs[a] = -o->aimed[p + r];
-    for (int j = 0; j < rows; j++) { /* z - DP (z - rho w) = 0 */
+    for (int j = 0; j < rows && r >= 0; j++) { /* z - DP (z - rho w) = 0; of a motion w = 0 */
       const int of = m->row[k] + j;
       const double d = o->D[9 * k + rows * (r - m->row[k]) + j], rho = o->rho[p + of], *W = column(m, o, (size_t)of);
 
-      if (d == 0) continue;
-      o->rhs[a] += d * (o->aimed[p + of] - rho * o->trial_w[p + of]);
-      for (size_t b = 0; b < count; b++) {
+      for (size_t b = 0; b < count && d != 0; b++) {
         const int s = o->unknown[b] - p;
 
         J[b] += d * rho * (s < 0 ? -o->A[(size_t)(s + p) * n + (size_t)of] : W[s]) - (s == of ? d : 0);
@@ -240,6 +241,26 @@ static void aim(const Model *m, Work *o, const double z[], int stick)
     }
   }
   factor_rows(count, o->J, o->pivot);
+  return count;
+}
+
+/* In o->aimed the solution on the pieces of P at y, from z, by the residual there, which takes round-off away. */
+static void aim(const Model *m, Work *o, const double z[], int stick)
+{
+  const int p = m->n_motions;
+  const size_t count = factor_pieces(m, o, z, stick);
+
+  slack(m, o, o->aimed, o->trial_w);
+  for (size_t a = 0; a < count; a++) {
+    const int i = o->unknown[a], r = i - p, k = r < 0 ? 0 : block_of(m, r), rows = m->row[k + 1] - m->row[k];
+
+    o->rhs[a] = r < 0 ? -o->rho[i] * o->trial_w[i] : -o->aimed[i];
+    for (int j = 0; j < rows && r >= 0; j++) {
+      const int of = p + m->row[k] + j;
+
+      o->rhs[a] += o->D[9 * k + rows * (r - m->row[k]) + j] * (o->aimed[of] - o->rho[of] * o->trial_w[of]);
+    }
+  }
   solve_rows(count, o->J, o->pivot, o->rhs);
   for (size_t a = 0; a < count; a++) o->aimed[o->unknown[a]] += o->rhs[a];
 }
@@ -344,16 +365,16 @@ static void close_gaps(const Model *m, Work *o)
   backward(p, p, o->S, o->z);
 }
 
-/* From the forces before or, where their residual is smaller, those extrapolated. Bodies that contact alone holds begin with
+/* From the forces before (again: the present ones) or, where their residual is smaller, those extrapolated. Bodies that contact alone holds begin with
    no forces if no load acts on them. */
-static int from_forces(const Model *m, Work *o, int *iterations)
+static int from_forces(const Model *m, Work *o, int again, int *iterations)
 {
   const State *s = &o->s;
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
-  const double ratio = *s->taken > 1 && p == 0 ? (o->t - *s->t) / (*s->t - *s->t_before) : 0;
+  const double ratio = *s->taken > 1 && p == 0 && !again ? (o->t - *s->t) / (*s->t - *s->t_before) : 0;
   double given, size;
 
-  memcpy(o->z, s->z, (p + n) * sizeof(double));
+  if (!again) memcpy(o->z, s->z, (p + n) * sizeof(double));
   o->largest = 0;
   for (size_t i = p; i < p + n; i++) o->largest = fmax(o->largest, fabs(o->z[i]));
   if (p && o->largest > 0) close_gaps(m, o);
@@ -370,7 +391,7 @@ static int from_forces(const Model *m, Work *o, int *iterations)
 
 /* A step with friction: from the forces of the last one; from the solution without friction; from that in which all contacts
    stick, and its admissible forces. Returns the residual. */
-static double solve_slip(const Model *m, Work *o, int *iterations)
+static double solve_slip(const Model *m, Work *o, int again, int *iterations)
 {
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
 
@@ -378,7 +399,8 @@ static double solve_slip(const Model *m, Work *o, int *iterations)
   for (int k = 0; k < m->n_slip; k++) {
     for (int i = m->row[k] + 1; i < m->row[k + 1]; i++) o->q[p + (size_t)i] += o->s.place[i];
   }
-  if (!from_forces(m, o, iterations) && !(solve(m, o, iterations) <= m->tolerance && iterate(m, o, iterations))) {
+  if (!from_forces(m, o, again, iterations) &&
+      !(solve(m, o, iterations) <= m->tolerance && iterate(m, o, iterations))) {
     memset(o->z, 0, (p + n) * sizeof(double));
     aim(m, o, o->z, 1);
     memcpy(o->z, o->aimed, (p + n) * sizeof(double));
@@ -392,6 +414,38 @@ static double solve_slip(const Model *m, Work *o, int *iterations)
   return law_residual(m, o);
 }
 
+#if FLOWS
+/* The pieces of the law at z, and what changes of q by -dq change there: dz. */
+static void take_pieces(const Model *m, Work *o)
+{
+  double size;
+
+  slack(m, o, o->z, o->w);
+  (void)measure(m, o, o->z, o->w, &size);
+  memcpy(o->from, o->from_next, (size_t)(m->n_motions + m->n_contacts) * sizeof(double));
+  o->n_unknown = factor_pieces(m, o, o->z, 0);
+}
+
+static int derive_pieces(const Model *m, Work *o, const double dq[], double dz[])
+{
+  const int p = m->n_motions;
+
+  for (size_t a = 0; a < o->n_unknown; a++) {
+    const int r = o->unknown[a] - p, k = r < 0 ? 0 : block_of(m, r), rows = m->row[k + 1] - m->row[k];
+
+    o->rhs[a] = 0;
+    for (int i = m->row[k]; i < m->row[k + 1] && r >= 0; i++)
+      o->rhs[a] += o->D[9 * k + rows * (r - m->row[k]) + i - m->row[k]] * o->rho[p + i] * dq[i];
+  }
+  solve_rows(o->n_unknown, o->J, o->pivot, o->rhs);
+  for (size_t a = 0; a < o->n_unknown; a++) {
+    if (o->unknown[a] >= p) dz[o->unknown[a] - p] = o->rhs[a];
+  }
+  return 1;
+}
+#endif
+#endif
+
 /* The step's end is the next one's begin. */
 static void accept(const Model *m, Work *o)
 {
@@ -403,6 +457,8 @@ static void accept(const Model *m, Work *o)
   *s->t = o->t;
   ++*s->taken;
   memcpy(s->mu, o->v, (size_t)m->n_parameters * sizeof(double));
+  if (m->n_modes) memcpy(s->alpha, o->alpha, (size_t)m->n_modes * sizeof(double));
+  if (m->n_points) memcpy(s->flowed, o->flowed, (size_t)(m->n_points * (m->n_strain + 2)) * sizeof(double));
   if (!m->n_slip) return;
   memcpy(s->before, s->z + p, n * sizeof(double));
   memcpy(s->z, o->z, (p + n) * sizeof(double));
@@ -436,40 +492,43 @@ static int try_step(const Model *m, Work *o, const double mu[], double t, double
 }
 
 /* From the state's time to t, where the parameters are mu; until there they go on a straight line. Steps end at the rows of
-   tables, and are halved where they have no solution. The state is as before if there is none. */
+   tables; they are halved where they have no solution, and grow, as in the library. The state is as before if there is none. */
 static int advance(const Model *m, Work *o, const double mu[], double t, double state[], double out[], double *kkt,
                    int *iterations)
 {
-  double *mu_of = o->v + m->n_parameters + 1 + m->n_tables, begin, whole, now, dt;
+  double *mu_of = o->v + m->n_parameters + 1 + m->n_tables;
+  const State before = state_of(m, o->saved);
+  double now, dt;
   int status = DIVERGED;
 
   o->s = state_of(m, state);
-  now = begin = *o->s.t;
-  dt = whole = t - begin;
   *kkt = HUGE_VAL;
   *iterations = 0;
   for (int i = 0; i < m->n_outputs; i++) out[i] = NAN;
   memcpy(o->saved, state, state_size(m) * sizeof(double));
+  now = *before.t;
+  dt = *before.dt > 0 ? *before.dt : HUGE_VAL;
   /* At first all loads act at once, from rest. */
-  if (*o->s.taken == 0) status = try_step(m, o, mu, t, out, kkt, iterations);
-  while (*o->saved > 0 && now < t) {
-    double stop = t, to;
+  if (*before.taken == 0) status = try_step(m, o, mu, t, out, kkt, iterations);
+  while (*before.taken > 0 && now < t) {
+    double stop = t, n, h, to;
 
     for (int i = 0; i < (m->n_tables ? m->table[m->n_tables] : 0); i++) {
       if (m->table_t[i] > now) stop = fmin(stop, m->table_t[i]);
     }
-    to = now + dt < stop ? now + dt : stop;
+    n = ceil((stop - now) / dt - 1e-9);
+    h = n > 1 ? (stop - now) / n : stop - now;
+    to = n > 1 ? now + h : stop;
     for (int i = 0; i < m->n_parameters; i++)
-      mu_of[i] = to < t ? o->saved[3 + i] + (mu[i] - o->saved[3 + i]) * ((to - begin) / whole) : mu[i];
+      mu_of[i] = to < t ? before.mu[i] + (mu[i] - before.mu[i]) * ((to - *before.t) / (t - *before.t)) : mu[i];
     status = try_step(m, o, mu_of, to, out, kkt, iterations);
-    if (status == OK) {
-      now = to;
-      dt *= 2;
-    } else {
-      dt = (to - now) / 2;
-      if (dt < whole / 1024) break;
-    }
+    if (status != OK && h / 2 < m->least) break;
+    if (status != OK) dt = h / 2;
+    if (status != OK) continue;
+    now = to;
+    if (!m->n_modes || (o->easy && 1.5 * o->increment <= m->most_increment)) dt = fmax(dt, 1.5 * h);
   }
+  if (status == OK && *before.taken > 0) *o->s.dt = dt;
   if (status != OK) memcpy(state, o->saved, state_size(m) * sizeof(double));
   return status;
 }

@@ -12,6 +12,7 @@
 #include "expression.h"
 #include "model.h"
 #include "surfaces.c"
+#include <float.h>
 
 /* Arrays in the caller's memory. */
 typedef struct {
@@ -34,12 +35,37 @@ typedef struct {
   int *unknown, *pivot;
   double t; /* the step's end */
   State s;  /* its begin, and then its end */
+  /* Bodies that flow: see flow.c. P as A; by mode; with `softer`, of the chosen points; by point; q without alpha */
+  double *P, *alpha, *alpha_at, *lack, *step, *K, *row_of_K, *Z, *slope, *strain_at, *z_at, *q_elastic, *aside;
+  double *softer, *strain, *elastic, *stress, *lost, *flowed, *size, *constant;
+  double most_lack, increment; /* tolerance of lack; the largest of the inelastic strains */
+  int *pivot_of_K, has_tangent, easy;
+  size_t n_unknown;
 } Work;
+
+/* What programs of bodies that flow do, and others; of contacts with friction. */
+#if FLOWS
+#define FLOW(does, else_does) does
+static size_t flow_doubles(const Model *m);
+static void place_flow(const Model *m, double **next, Work *o);
+static void set_points(const Model *m, const Work *o, const double v[]);
+static double solve_flow(const Model *m, Work *o, int *iterations);
+static int settle(const Model *m, Work *o);
+#else
+#define FLOW(does, else_does) else_does
+#endif
+#if SLIPS
+#define SLIP(does, else_does) (m->n_slip ? (does) : (else_does))
+#else
+#define SLIP(does, else_does) else_does
+#endif
 
 static size_t path_doubles(const Model *m);
 static size_t path_ints(const Model *m);
 static void place_path(const Model *m, double **next, Work *o);
-static double solve_slip(const Model *m, Work *o, int *iterations);
+#if SLIPS
+static double solve_slip(const Model *m, Work *o, int again, int *iterations);
+#endif
 static void accept(const Model *m, Work *o);
 
 /* The largest members come first, so that all are aligned. */
@@ -50,12 +76,12 @@ static size_t work_size(const Model *m)
                nodes = (size_t)s->n_nodes, facets = (size_t)s->n_facets;
   const size_t doubles = (size_t)(m->n_atoms + m->n_functions + m->n_values + m->n_terms) + 4 * (p + n) +
                          2 * (p + places) + 2 * n * n + 2 * p * n + p * p + n + 7 * nodes + 3 * facets +
-                         path_doubles(m);
+                         path_doubles(m) + FLOW(flow_doubles(m), 0);
   const size_t moved =
       nodes ? n * sizeof(Met) + facets * sizeof(HycoPoint) + (size_t)HycoPatchesBoxes(s->n_facets) * sizeof(HycoBox)
             : 0;
 
-  return doubles * sizeof(double) + moved + (4 * n + 2 * places + 1 + path_ints(m)) * sizeof(int);
+  return doubles * sizeof(double) + moved + (4 * n + 2 * places + 1 + path_ints(m) + (size_t)m->n_modes) * sizeof(int);
 }
 
 static double *take(double **from, size_t n)
@@ -94,6 +120,7 @@ static void place(const Model *m, void *memory, Work *o)
   o->room.area = take(&next, (size_t)s->n_nodes);
   o->room.normal = take(&next, 3 * (size_t)s->n_facets);
   place_path(m, &next, o);
+  FLOW(place_flow(m, &next, o), (void)0);
   o->met = (Met *)(void *)next;
   if (s->n_nodes) {
     o->room.item = (HycoPoint *)(void *)(o->met + n);
@@ -108,6 +135,7 @@ static void place(const Model *m, void *memory, Work *o)
   o->before = o->touched + places;
   o->unknown = o->before + places + 1;
   o->pivot = o->unknown + path_ints(m) / 2;
+  o->pivot_of_K = o->unknown + path_ints(m);
 }
 
 /* Four sums, which a compiler may add side by side. */
@@ -126,12 +154,12 @@ static double dot(size_t n, const double a[], const double b[])
 /* to += factor from. */
 static void add(size_t n, double factor, const double *restrict from, double *restrict to)
 {
-  size_t i = 0;
+  const size_t whole = n - n % 4;
 
-  for (; i + 4 <= n; i += 4) {
+  for (size_t i = 0; i < whole; i += 4) {
     for (size_t k = 0; k < 4; k++) to[i + k] += factor * from[i + k];
   }
-  for (; i < n; i++) to[i] += factor * from[i];
+  for (size_t i = whole; i < n; i++) to[i] += factor * from[i];
 }
 
 /* W of contact a by those at places: y = the sum of C_b B_b^T over the bodies, then B y. */
@@ -244,7 +272,11 @@ static int assemble(const Model *m, Work *o)
     o->q[p + i] = a->n ? a->gap : 0;
     for (int e = 0; e < a->n; e++) o->q[p + i] += a->value[e] * q[p + (size_t)a->place[e]];
   }
+  if (m->n_modes) memset(o->P, 0, (size_t)m->n_modes * n * sizeof(double));
   for (size_t k = 0; k < (size_t)m->n_stiffness; k++) {
+    const size_t all = (size_t)m->n_modes * n; /* surfaces of bodies that flow do not move */
+
+    if (all) add(all, o->f[m->stiffness[k]], m->P + k * all, o->P);
     for (size_t j = 0; j < p; j++) {
       const double factor = o->f[m->stiffness[k]], *A = m->A + (k * p + j) * places;
 
@@ -372,6 +404,19 @@ static double pin_of(const Model *m, Work *o)
   return flexible > 0 && moves > 0 ? flexible / moves : 1;
 }
 
+/* y and x of L L^T y - V' x = y, V'^T y = -x, by the factors L and S, and V = L^-1 V'. */
+static void solve_factored(const Model *m, const Work *o, double y[], double x[])
+{
+  const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts, k = (size_t)o->n_closed;
+
+  forward(k, n, o->L, y);
+  for (size_t i = 0; i < p; i++) x[i] -= dot(k, o->V + i * k, y);
+  forward(p, p, o->S, x);
+  backward(p, p, o->S, x);
+  for (size_t j = 0; j < p; j++) add(k, x[j], o->V + j * k, y);
+  backward(k, n, o->L, y);
+}
+
 /* z with the closed contacts at gap 0 and the others without force; epsilon, delta: of epsilon (x - last) added to w_x, and
    delta (L - last) to w_L. Returns 0 if the closed contacts do not hold the bodies. */
 static int solve_set(const Model *m, Work *o, double epsilon, double delta)
@@ -399,21 +444,15 @@ static int solve_set(const Model *m, Work *o, double epsilon, double delta)
     }
   }
   factorise(k, n, same, o->L);
-  forward(k, n, o->L, o->y);
   for (size_t i = 0; i < p; i++) {
     forward(k, n, o->L, o->V + i * k);
     for (size_t j = 0; j <= i; j++) o->S[i * p + j] = dot(k, o->V + i * k, o->V + j * k);
     o->S[i * p + i] += epsilon;
-    x[i] = -o->q[i] - dot(k, o->V + i * k, o->y) + epsilon * o->last[i];
+    x[i] = epsilon * o->last[i] - o->q[i];
   }
   loose = factorise(p, p, 0, o->S);
   if (loose) return 0;
-  forward(p, p, o->S, x);
-  backward(p, p, o->S, x);
-  for (size_t i = 0; i < k; i++) {
-    for (size_t j = 0; j < p; j++) o->y[i] += o->V[j * k + i] * x[j];
-  }
-  backward(k, n, o->L, o->y);
+  solve_factored(m, o, o->y, x);
   for (size_t i = 0; i < k; i++) L[o->at[i]] = o->y[i];
   return 1;
 }
@@ -578,6 +617,8 @@ static void evaluate(const Model *m, Work *o)
   for (size_t j = 0; j < p + (size_t)m->n_places; j++) {
     if (o->push[j] != 0) add(n, o->push[j], m->term + j * n, o->sum);
   }
+  for (size_t j = 0; j < (size_t)m->n_modes; j++)
+    add(n, o->alpha[j], m->term + (p + (size_t)m->n_places + j) * n, o->sum);
   for (size_t i = 0; i < n; i++) o->value[m->value[i]] += o->f[m->factor[i]] * o->sum[i];
 }
 
@@ -681,12 +722,14 @@ static int predict(const Model *m, Work *o, const double v[], double out[], doub
   for (int i = 0; i < m->n_motions + m->n_contacts; i++) {
     if (!isfinite(o->q[i])) return DIVERGED;
   }
-  *kkt = m->n_slip ? solve_slip(m, o, iterations) : solve(m, o, iterations);
+  FLOW(set_points(m, o, v), (void)0);
+  *kkt = FLOW(solve_flow(m, o, iterations), SLIP(solve_slip(m, o, 0, iterations), solve(m, o, iterations)));
+  evaluate(m, o);
+  if (!FLOW(settle(m, o), 1)) *kkt = HUGE_VAL;
   if (*kkt <= m->tolerance) accept(m, o);
   /* 1e-10 of the largest force. */
   for (int i = 0; i < m->n_contacts; i++)
     least = is_normal(m, (size_t)i) ? fmax(least, 1e-10 * o->z[m->n_motions + i]) : least;
-  evaluate(m, o);
   for (int i = 0; i < m->n_outputs; i++) {
     out[i] = output(m, o, &m->output[i], least);
     if (!isfinite(out[i])) *kkt = HUGE_VAL;

@@ -6,24 +6,27 @@
 */
 #include <hycoflow.h>
 
+/* -- begin: in exported models too -- */
 #define GAS_CONSTANT 8.31446261815324 /* J / (mol K) */
 
-enum { RATE, FACTOR, ACTIVATION, MODULUS, N_CONSTANTS };
+enum { LIMBACK_RATE, LIMBACK_FACTOR, LIMBACK_ACTIVATION, LIMBACK_MODULUS, LIMBACK_N_CONSTANTS };
 
 /* scratch: dt rate E'/T exp(-Q/RT), factor / E'. What does not depend on q, once per point and step. */
-static void Prepare(HycoFlowPoint *p, const char **why)
+static void LimbackAnderssonPrepare(HycoFlowPoint *p, const char **why)
 {
-  const PetscReal T = p->temperature, modulus = p->c[MODULUS] < 0 ? 1.148e5 - 59.9 * T : p->c[MODULUS];
+  const PetscReal T = p->temperature, modulus = p->c[LIMBACK_MODULUS] < 0 ? 1.148e5 - 59.9 * T : p->c[LIMBACK_MODULUS];
 
   if (!(T > 0)) *why = "creep of Limback and Andersson needs a temperature above 0 K";
   /* Above about 1643 degrees C, far outside of the law's range. */
   if (!(modulus > 0)) *why = "the temperature is too high: the modulus 1.148e5 - 59.9 T is not positive";
-  p->scratch[0] = *why ? 0 : p->dt * p->c[RATE] * modulus / T * PetscExpReal(-p->c[ACTIVATION] / (GAS_CONSTANT * T));
-  p->scratch[1] = *why ? 0 : p->c[FACTOR] / modulus;
+  p->scratch[0] =
+      *why ? 0
+           : p->dt * p->c[LIMBACK_RATE] * modulus / T * PetscExpReal(-p->c[LIMBACK_ACTIVATION] / (GAS_CONSTANT * T));
+  p->scratch[1] = *why ? 0 : p->c[LIMBACK_FACTOR] / modulus;
 }
 
 /* Creep strain of the step at q, and its derivative. */
-static PetscReal Creep(const HycoFlowPoint *p, PetscReal q, PetscReal *slope)
+static PetscReal LimbackAnderssonCreep(const HycoFlowPoint *p, PetscReal q, PetscReal *slope)
 {
   /* cosh from sinh: one exponential fewer; both overflow to infinity, which the bracket of the iteration takes. */
   const PetscReal sh = sinh(p->scratch[1] * q), ch = PetscSqrtReal(1 + sh * sh);
@@ -33,7 +36,7 @@ static PetscReal Creep(const HycoFlowPoint *p, PetscReal q, PetscReal *slope)
 }
 
 /* sinh(2 x) / 4 - x / 2, by its series where the difference cancels. */
-static PetscReal CreepIntegral(const HycoFlowPoint *p, PetscReal q)
+static PetscReal LimbackAnderssonCreepIntegral(const HycoFlowPoint *p, PetscReal q)
 {
   const PetscReal x = p->scratch[1] * q, y = x * x;
   const PetscReal sum = x > 0.1 ? sinh(2 * x) / 4 - x / 2
@@ -42,12 +45,15 @@ static PetscReal CreepIntegral(const HycoFlowPoint *p, PetscReal q)
   return x > 0 ? p->scratch[0] / p->scratch[1] * sum : 0;
 }
 
+const HycoFlowRule HycoFlowLimbackAndersson = {.n_constants = LIMBACK_N_CONSTANTS,
+                                               .prepare = LimbackAnderssonPrepare,
+                                               .creep = LimbackAnderssonCreep,
+                                               .creep_integral = LimbackAnderssonCreepIntegral};
+/* -- end: in exported models too -- */
+
 /* The constants are those of the paper, for MPa and hours: a scene in other units must give rate and modulus. */
 PetscErrorCode HycoMaterialCreate_LimbackAndersson(HycoMaterial material)
 {
-  static const HycoFlowRule rule = {
-      .n_constants = N_CONSTANTS, .prepare = Prepare, .creep = Creep, .creep_integral = CreepIntegral};
-
   PetscFunctionBegin;
   PetscCall(HycoElasticDeclare(material));
   PetscCall(
@@ -59,6 +65,6 @@ PetscErrorCode HycoMaterialCreate_LimbackAndersson(HycoMaterial material)
                                                                                                             function
                                                                                                             of T */
   PetscCall(HycoMaterialSetHeat(material, PETSC_TRUE));
-  PetscCall(HycoFlowEnd(material, &rule));
+  PetscCall(HycoFlowEnd(material, &HycoFlowLimbackAndersson));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

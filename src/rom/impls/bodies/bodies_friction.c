@@ -310,7 +310,7 @@ PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction f, HycoBodiesWork o, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* w = D - B U of a step from rest, without slip before it, for any forces: what a program of the model is made of. */
+/* w = D - B U of a step from rest, without slip before it, for any forces and alpha: what a program of the model is made of. */
 PetscErrorCode HycoBodiesFrictionProbe(HycoBodiesFriction f, HycoBodiesWork o, const PetscReal mu[],
                                        const PetscReal z[], PetscReal w[])
 {
@@ -319,6 +319,7 @@ PetscErrorCode HycoBodiesFrictionProbe(HycoBodiesFriction f, HycoBodiesWork o, c
   PetscFunctionBegin;
   PetscCall(HycoBodiesFrictionBegin(f));
   PetscCall(HycoBodiesFrictionPrepare(f, o, mu));
+  if (o->bodies->inelastic->m) PetscCall(HycoBodiesStrain(o, &f->all, z + f->p + f->all.n));
   PetscCall(PetscArraycpy(f->z, z, f->p + f->all.n));
   PetscCall(PetscArraycpy(o->x, z, f->p));
   PetscCall(HycoBodiesFrictionMove(f, o, &kkt));

@@ -45,7 +45,7 @@ void HycoBodiesWorkOnMotions(HycoBodiesWork o, PetscReal w[])
 }
 
 /* Moves the model to mu and to the forces z, also where no solution is there: finite differences of w by mu. w
-   NULL: only the state, for HycoROMOps.expand. */
+   NULL: only the state, for HycoROMOps.expand. In models of bodies that flow their alpha follows in z. */
 PetscErrorCode HycoBodiesResidual(HycoROM m, const PetscReal mu[], const PetscReal z[], PetscReal w[], PetscReal *size)
 {
   HycoBodiesWork o = (HycoBodiesWork)m->work;
@@ -55,6 +55,7 @@ PetscErrorCode HycoBodiesResidual(HycoROM m, const PetscReal mu[], const PetscRe
   PetscFunctionBegin;
   if (mu) PetscCall(HycoROMBringRows(m, mu));
   if (mu) PetscCall(HycoBodiesPrepare(o, &s, mu));
+  if (mu && b->inelastic && b->inelastic->m) PetscCall(HycoBodiesStrain(o, &s, z + b->p + s.n));
   HycoCheck(!o->lacks, "beside this point, %s", HycoReasonName(HYCO_DIVERGED_SURFACE));
   PetscCall(PetscArraycpy(o->x, z, b->p));
   PetscCall(PetscArraycpy(m->Lambda, z + b->p, m->model->pairs.n));

@@ -441,6 +441,22 @@ PetscErrorCode HycoBodiesMoveCells(HycoROM m, const PetscReal alpha[], const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoBodiesProbeCells(HycoROM m, const PetscReal alpha[], const PetscReal Lambda[])
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+
+  PetscFunctionBegin;
+  w->n_set = 0;
+  for (PetscInt k = 0; k < w->surface.n; k++) {
+    if (Lambda[k] == 0) continue;
+    PetscCall(Column(m, k));
+    w->set[w->n_set++] = k;
+  }
+  PetscCall(HycoBodiesMoveCells(m, alpha, Lambda));
+  HycoBodiesRestart(m);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* e += the strains of prescribed displacements. The responses of training are those of unprescribed displacements: what
    supports move is added here. */
 static void AddSupports(HycoROM m, PetscReal e[])
@@ -706,7 +722,8 @@ static PetscErrorCode EvaluateStep(HycoROM m, PetscReal t0, PetscReal t1, PetscR
 static PetscErrorCode Newton(HycoROM m, PetscReal t0, PetscReal t1, PetscReal alpha[], HycoStepAttempt *a)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  const PetscInt most = w->path->max_its ? w->path->max_its : MOST_ITS;
+  /* Of each set or map: how many a step has is a matter of its rounds. */
+  const PetscInt most = a->iterations + (w->path->max_its ? w->path->max_its : MOST_ITS);
   /* PETSC_MAX_REAL: the first residual contracts from it, and the tangent of the last step stays. */
   PetscReal norm = PETSC_MAX_REAL, *last;
 

@@ -239,9 +239,9 @@ static PetscErrorCode Record(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -- the problem of a step, for programs: elastic bodies alone, from rest -- */
+/* -- the problem of a step, for programs: from rest -- */
 
-/* By row, with friction. */
+/* By row, with friction. alpha is in HycoBodiesPath. */
 static PetscErrorCode Unknowns(HycoROM m, PetscInt *p, PetscInt *n, PetscReal z[])
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -255,7 +255,26 @@ static PetscErrorCode Unknowns(HycoROM m, PetscInt *p, PetscInt *n, PetscReal z[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* mu: the variables, with the time. */
+/* The parts that are probed for bodies that flow: the tables at mu, the displacements of the cells. */
+static PetscErrorCode ProbeCells(HycoROM m, const PetscReal alpha[], const PetscReal L[])
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+  PetscScalar *kept;
+
+  PetscFunctionBegin;
+  if (!w->bodies.bodies->inelastic->nd) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!Unchanged(m)) {
+    PetscCall(HycoBodiesForget(m));
+    PetscCall(HycoBodiesScale(m));
+  }
+  PetscCall(HycoBodiesProbeCells(m, alpha, L));
+  PetscCall(VecGetArray(w->alpha, &kept));
+  PetscCall(PetscArraycpy(kept, alpha, w->bodies.bodies->inelastic->m));
+  PetscCall(VecRestoreArray(w->alpha, &kept));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* mu: the variables, with the time. Of bodies that flow, z ends with alpha. */
 static PetscErrorCode Residual(HycoROM m, const PetscReal mu[], const PetscReal z[], PetscReal w[], PetscReal *size)
 {
   HycoBodiesPath o = (HycoBodiesPath)m->work;
@@ -265,10 +284,12 @@ static PetscErrorCode Residual(HycoROM m, const PetscReal mu[], const PetscReal 
   m->trace.n_listed = 0; /* the outputs are those of this state, and of no path */
   if (!o->friction) {
     PetscCall(HycoBodiesResidual(m, mu, z, w, size));
+    PetscCall(ProbeCells(m, z + p + o->surface.n, z + p));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(HycoROMBringRows(m, mu));
   PetscCall(HycoBodiesFrictionProbe(o->friction, &o->bodies, mu, z, w + p));
+  PetscCall(ProbeCells(m, z + p + o->surface.n, z + p));
   HycoBodiesWorkOnMotions(&o->bodies, w);
   HycoBodiesFrictionNormal(o->friction, m->Lambda);
   HycoTraceShowOther(m, &HycoBodiesFrictionSlip(o->friction)->shear);
@@ -362,11 +383,15 @@ static PetscErrorCode Show(HycoROM m, PetscInt parameter, PetscBool rows, PetscR
 static PetscErrorCode Expand(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
+  const PetscScalar *alpha;
 
   PetscFunctionBegin;
   PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
+  PetscCall(VecGetArrayRead(w->alpha, &alpha));
+  HycoBodiesAddStrains(&w->bodies, alpha, m->gamma);
+  PetscCall(VecRestoreArrayRead(w->alpha, &alpha));
   PetscCall(HycoROMExpandModal(m));
-  HycoBodiesMove(&w->bodies, &w->surface, m->U);
+  MoveAll(m);
   HycoFEComplete(m->fe, m->U);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

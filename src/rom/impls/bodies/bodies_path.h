@@ -54,6 +54,8 @@ void HycoBodiesRestart(HycoROM model);
 PetscErrorCode HycoBodiesScale(HycoROM model);
 /* The displacements of the points' cells, without those prescribed there: u, for alpha and forces. */
 PetscErrorCode HycoBodiesMoveCells(HycoROM model, const PetscReal alpha[], const PetscReal Lambda[]);
+/* The same for any forces, on any contacts. */
+PetscErrorCode HycoBodiesProbeCells(HycoROM model, const PetscReal alpha[], const PetscReal Lambda[]);
 /* Newton's method on sets of contacts until one holds: alpha and the forces at t1 from those at t0; else a->why. */
 PetscErrorCode HycoBodiesSearch(HycoROM model, PetscReal t0, PetscReal t1, PetscReal alpha[], PetscReal Lambda[],
                                 HycoStepAttempt *a);
