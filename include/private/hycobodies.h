@@ -347,6 +347,8 @@ PetscErrorCode HycoBodiesForgetBeside(HycoBodiesWork work);
 void HycoBodiesWorkOnMotions(HycoBodiesWork work, PetscReal w[]);
 /* The part of the loads, without round-off. */
 PetscReal HycoBodiesLoadWork(HycoBodiesWork work, PetscInt motion);
+/* Of the loads' parts on all motions. */
+PetscReal HycoBodiesLoadRounding(HycoBodiesWork work);
 /* M of n contacts at the prepared parameters: p + n square by columns. */
 PetscErrorCode HycoBodiesMatrix(HycoBodiesWork work, PetscInt n, const PetscInt contact[], PetscReal M[]);
 /* Ops of gradients. */

@@ -262,6 +262,7 @@ PetscErrorCode HycoBodiesFrictionTouch(HycoBodiesFriction f, HycoBodiesWork o, P
                  .symmetric = PETSC_TRUE,
                  .blocks = f->blocks,
                  .cone = f->factor,
+                 .rounding = HycoBodiesLoadRounding(o),
                  .warm = PETSC_TRUE,
                  .given = PETSC_TRUE};
 
@@ -409,7 +410,7 @@ PetscErrorCode HycoBodiesFrictionSlides(HycoBodiesFriction f, HycoBodiesWork o, 
   PetscCall(PetscMalloc3(p * n, &A, p, &load, n, &r));
   for (PetscInt i = 0; i < p; i++) load[i] = -f->q[i];
   MotionRows(f, A);
-  PetscCall(HycoBlocksBalance(f->blocks, p, A, load, r, &exists));
+  PetscCall(HycoBlocksBalance(f->blocks, p, A, load, HycoBodiesLoadRounding(o), r, &exists));
   *slides = (PetscBool)!exists;
   if (*slides) {
     PetscReal size = 0;
