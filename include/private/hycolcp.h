@@ -95,10 +95,10 @@ typedef struct {
   PetscBool warm;      /* HYCO_TAO_CONES types start from the last solution of their Tao */
   PetscBool given;     /* these start from z instead, */
   const PetscReal
-      *other;       /* or (NULL: none; without free unknowns) from these forces, where their residual is smaller */
+      *other;         /* or (NULL: none; without free unknowns) from these forces, where their residual is smaller */
   PetscReal rounding; /* of the loads on the free unknowns: what no forces need to balance */
-  PetscInt *sign;   /* NULL, or from these: the sign of the determinant of J at the solution; 0: not known */
-  PetscInt max_its; /* iterations of the active set; 0: 50 + 4 n */
+  PetscInt *sign;     /* NULL, or from these: the sign of the determinant of J at the solution; 0: not known */
+  PetscInt max_its;   /* iterations of the active set; 0: 50 + 4 n */
   HycoLCPMonitor monitor;
   void *monitor_ctx;
 } HycoLCP;
