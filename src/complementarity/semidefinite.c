@@ -388,7 +388,7 @@ static PetscErrorCode TakeExact(Floating *h, PetscBool active[], PetscBool *sing
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(h->m, &violates));
   PetscCall(SolveOnSet(h, active, singular));
-  *exact = (PetscBool)!*singular;
+  *exact = (PetscBool) !*singular;
   if (*exact) PetscCall(Violations(h, active, violates));
   for (PetscInt i = 0; *exact && i < h->m; i++) *exact = (PetscBool)!violates[i];
   PetscCall(PetscFree(violates));

@@ -145,7 +145,8 @@ class Overhang(Case):
 
     def test_tiny_loads(self):
         """A plug in a turned V groove under pressures on its sides that balance themselves and a load on top that is 1e-12 to 1e-3 of them, in all points of sets of
-        models, without friction and with it along a path: a solution everywhere, and forces that balance the load."""
+        models, without friction and with it along a path: a solution everywhere, and forces that balance the load; a position that no
+        force determines is named and not compared."""
         grid, sides = Grid(), np.linspace(-1, 1, 9)
         turn = lambda x, y: 0.37 * np.stack([np.cos(0.3) * x - np.sin(0.3) * y, np.sin(0.3) * x + np.cos(0.3) * y], -1)
         grid.box('quad4', [sides, np.append(np.linspace(0, 1, 9), [1.3, 1.6])], lambda p: turn(p[:, 0] * np.minimum(6 + 10 * p[:, 1], 16), 6 + 10 * p[:, 1]), 'plug',
@@ -175,6 +176,12 @@ history: {times: [0, 1, 2, 3, 4, 5], tables: {a: [[0, 0], [1, 1], [3, 1], [4, 0]
                 rows = np.genfromtxt(self.path('t.csv'), delimiter=',', names=True)
                 clear = rows['press'] > 5e-10
                 np.testing.assert_allclose(rows['total_contact_force'][clear], 32 * 0.37 * np.sqrt(2) * rows['press'][clear], rtol=1e-3)
+        # without a force, or with too few of them, displacements are arbitrary: they are not compared
+        report = self.hyco('compare', '-scene', 'scene.yaml', '-model', 'scene.h5', '-values_press', '0,20', '-values_squeeze', -40, '-values_mu', 0)
+        self.assertEqual(report['estimates']['position_arbitrary'], 1)
+        self.assertLess(report['worst_u']['max'], 1e-6)
+        report = self.hyco('predict', '-model', 'scene.h5', '-mu', '0,-40,0')
+        self.assertEqual((report['position_arbitrary'], report['estimated_error_u']), (True, None))
 
     def test_balanced(self):
         """Loads that are in equilibrium with themselves press no body, in all points of a set and in a model: no forces, no contact closed, the body stays. A ring

@@ -395,6 +395,14 @@ PetscReal HycoBodiesLoadRounding(HycoBodiesWork o)
   return ROUNDED * most * all;
 }
 
+PetscBool HycoBodiesLoaded(HycoBodiesWork o)
+{
+  PetscReal all = 0;
+
+  for (PetscInt j = 0; j < o->bodies->r; j++) all += PetscAbsReal(o->c[j]);
+  return (PetscBool)(all > 0);
+}
+
 /* The rigid motions at mu, and the work of the loads on them. */
 static PetscErrorCode BlendMotions(HycoBodiesWork o)
 {
