@@ -79,8 +79,9 @@ typedef struct {
   HycoSeconds seconds;
   PetscInt n_dependent; /* bodies: as in HycoSummary; else -1. If > 0, the contact forces have no estimate */
   PetscBool
-      loose; /* bodies, without a history: the contact forces leave a motion of a body free, along which its position is
-                           arbitrary. Displacements, and outputs of them, then have no estimate */
+      loose; /* bodies: the contact forces leave a motion of a body free, along which its position is arbitrary; on a path at
+                           a listed time with forces, with friction also at a time before. Displacements, outputs of them and
+                           the work of friction then have no estimate */
 } HycoPrediction;
 
 /* Result of the scan for a singular reduced stiffness in the parameters' ranges. */

@@ -293,7 +293,7 @@ PetscErrorCode HycoBodiesFrictionPrepare(HycoBodiesFriction friction, HycoBodies
 PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction friction, HycoBodiesWork work, PetscReal t, HycoKKT *kkt,
                                        PetscInt *its, PetscBool *solved);
 /* The solved step becomes the state of the contacts at t. */
-PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction friction, PetscReal t);
+PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction friction, HycoBodiesWork work, PetscReal t);
 /* The parts of a step of bodies that deform inelastically: the forces at alpha (`again`: not the first alpha of the step),
    with x of work, o->free and the gaps; u, f and the residuals for these forces. */
 PetscErrorCode HycoBodiesFrictionTouch(HycoBodiesFriction friction, HycoBodiesWork work, PetscReal t,
@@ -334,6 +334,8 @@ PetscErrorCode HycoBodiesFrictionDerive(HycoBodiesFriction friction, PetscInt m,
    has further solutions. */
 void HycoBodiesFrictionNormal(HycoBodiesFriction friction, PetscReal Lambda[]);
 const HycoSlip *HycoBodiesFrictionSlip(HycoBodiesFriction friction);
+/* Whether a state accepted since the begin left a rigid motion free, or the last one has loads but no forces. */
+PetscBool HycoBodiesFrictionLoose(HycoBodiesFriction friction);
 PetscErrorCode HycoBodiesFrictionDisproven(HycoBodiesFriction friction, PetscBool *disproven);
 /* Parts of a solve for gradients. HycoBodiesBring(): the data of the bodies, c and the rows at mu, as HycoBodiesPrepare();
    o->gap: those of the rows (surface NULL: these stay). HycoBodiesBlend(): sum[n] of the samples' numbers by their weights. HycoBodiesYield(): u -= C f /
@@ -358,6 +360,9 @@ void HycoBodiesGaps(HycoROM model, PetscReal w[], PetscReal *size);
 void HycoBodiesWorkOnMotions(HycoBodiesWork work, PetscReal w[]);
 /* The part of the loads, without round-off. */
 PetscReal HycoBodiesLoadWork(HycoBodiesWork work, PetscInt motion);
+PetscBool HycoBodiesLoaded(HycoBodiesWork work);
+/* Of the loads' parts on all motions. */
+PetscReal HycoBodiesLoadRounding(HycoBodiesWork work);
 /* M of n contacts at the prepared parameters: p + n square by columns. */
 PetscErrorCode HycoBodiesMatrix(HycoBodiesWork work, PetscInt n, const PetscInt contact[], PetscReal M[]);
 /* Ops of gradients. */

@@ -95,9 +95,10 @@ typedef struct {
   PetscBool warm;      /* HYCO_TAO_CONES types start from the last solution of their Tao */
   PetscBool given;     /* these start from z instead, */
   const PetscReal
-      *other;       /* or (NULL: none; without free unknowns) from these forces, where their residual is smaller */
-  PetscInt *sign;   /* NULL, or from these: the sign of the determinant of J at the solution; 0: not known */
-  PetscInt max_its; /* iterations of the active set; 0: 50 + 4 n */
+      *other;         /* or (NULL: none; without free unknowns) from these forces, where their residual is smaller */
+  PetscReal rounding; /* of the loads on the free unknowns: what no forces need to balance */
+  PetscInt *sign;     /* NULL, or from these: the sign of the determinant of J at the solution; 0: not known */
+  PetscInt max_its;   /* iterations of the active set; 0: 50 + 4 n */
   HycoLCPMonitor monitor;
   void *monitor_ctx;
 } HycoLCP;
@@ -132,10 +133,11 @@ PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscRea
 PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank);
 /*
   Whether forces of the blocks balance a load f on p motions, A r = f with A (p x rows, by columns); if not, r are those that
-  come nearest. True where it is not decided, as for laws other than Coulomb's. Not collective.
+  come nearest. Less than `rounding` of f need not be balanced. True where it is not decided, as for laws other than
+  Coulomb's. Not collective.
 */
 PetscErrorCode HycoBlocksBalance(const HycoBlocks *blocks, PetscInt p, const PetscReal A[], const PetscReal f[],
-                                 PetscReal r[], PetscBool *exists);
+                                 PetscReal rounding, PetscReal r[], PetscBool *exists);
 /* Where none do: adds normal forces to r, so that f - A r is a motion along which no contact opens: the bodies slide by it. */
 PetscErrorCode HycoBlocksLeaveSlide(const HycoBlocks *blocks, PetscInt p, const PetscReal A[], const PetscReal f[],
                                     PetscReal r[]);

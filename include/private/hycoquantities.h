@@ -27,7 +27,7 @@ PetscErrorCode HycoQuantitiesMarkDecisive(HycoFE fe, const PetscReal u[], const 
 /* Whether it is the extreme or the mean of a stress in cells. */
 PetscBool HycoQuantityOfStress(const HycoQuantity *q);
 /* The same of a displacement. */
-PetscBool HycoQuantityOfDisplacement(const HycoQuantity *q);
+PetscBool HycoQuantityOfPosition(const HycoQuantity *q);
 /* Marks the cells whose stresses the quantities need. */
 PetscErrorCode HycoQuantitiesMarkStressed(HycoScene scene, HycoMesh mesh, PetscBool stressed[]);
 /* Which reactions follow from balance (balance.c): balanced[k * n_bodies + b], for each quantity k the bodies b of

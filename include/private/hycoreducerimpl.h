@@ -339,6 +339,8 @@ typedef struct {
 PetscErrorCode HycoROMMeasureRID(HycoROM model, const PetscReal u[], const PetscReal sigma[],
                                  const PetscReal inelastic[], const PetscReal lambda[], HycoLost lost[]);
 /* The errors of a path from those of its n listed times (n x HYCO_N_ERRORS). */
+/* Takes away errors of displacements at a listed time at which the position of a body is arbitrary. */
+void HycoTraceForgive(HycoROM rom, PetscInt step, HycoLost lost[]);
 void HycoPathErrorsJudge(PetscInt n, const HycoLost lost[], HycoPathErrors *errors);
 
 /* Stops the predictions of held-out paths early: at the first one, in the order of `order`, that does not reach its

@@ -67,6 +67,7 @@ typedef struct {
   PetscReal *t, *gamma, *U_fe; /* n, n x l, n x n_fe */
   PetscInt n_listed, shown;    /* number of listed times reached; the one to which gamma, U and Lambda belong */
   PetscInt *at;                /* by listed time: its accepted step */
+  PetscBool *loose;            /* by listed time: the position of a body is arbitrary (HycoPrediction) */
   PetscReal *Lambda, *sigma, *inelastic;
   PetscReal *shear; /* 8 n_contacts by listed time: force, slip, work, state; NULL: no friction */
   HycoShear seen;   /* borrows those of a listed time, or others */

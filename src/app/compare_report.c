@@ -24,8 +24,8 @@ PetscErrorCode DriverCompareColumns(PetscBool paths, PetscInt n_outputs, const c
                                       "seconds_full_order", "seconds_reduced", "lambda_norm2", "sigma_norm2"};
   static const char *const path[] = {"converged",  "times_reached",      "kkt_max",
                                      "iterations", "seconds_full_order", "seconds_reduced"};
-  static const char *const judged[] = {"estimated_error_u", "estimated_error_sigma", "estimated_error_lambda",
-                                       "unseen"};
+  static const char *const judged[] = {"estimated_error_u", "estimated_error_sigma", "estimated_error_lambda", "unseen",
+                                       "position_arbitrary"};
 
   PetscFunctionBegin;
   c->paths = paths;
@@ -35,7 +35,7 @@ PetscErrorCode DriverCompareColumns(PetscBool paths, PetscInt n_outputs, const c
   c->n_errors = c->n;
   PetscCall(paths ? Add(c, DRIVER_SECONDS_ROM + 1, "", path) : Add(c, DRIVER_SIGMA_NORM + 1, "", point));
   c->estimates = c->n;
-  PetscCall(Add(c, DRIVER_ESTIMATES + 1, "", judged));
+  PetscCall(Add(c, DRIVER_ESTIMATES + 2, "", judged));
   c->outputs = c->n;
   PetscCall(Add(c, n_outputs, paths ? "worst_output_" : "error_output_", outputs));
   if (paths) PetscCall(Add(c, n_outputs, "end_output_", outputs));
@@ -87,7 +87,7 @@ static PetscErrorCode JudgeEstimates(cJSON *json, const DriverColumns *c, PetscI
   static const char *const keys[] = {"u", "sigma", "lambda"};
   cJSON *all = cJSON_AddObjectToObject(json, "estimates");
   PetscReal *ratio, *error;
-  PetscInt unseen = 0;
+  PetscInt unseen = 0, loose = 0;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(n, &ratio, n, &error));
@@ -119,6 +119,12 @@ static PetscErrorCode JudgeEstimates(cJSON *json, const DriverColumns *c, PetscI
     else
       PetscCall(DriverPrint(", where all errors are 0\n"));
   }
+  for (PetscInt k = 0; k < n; k++) loose += value[k * c->n + c->estimates + DRIVER_ESTIMATES + 1] > 0;
+  cJSON_AddNumberToObject(all, "position_arbitrary", loose);
+  if (loose)
+    PetscCall(DriverPrint("at %d of %d contact leaves a motion of a body free: displacements are arbitrary there, and "
+                          "not compared\n",
+                          (int)loose, (int)n));
   for (PetscInt k = 0; k < n; k++) unseen += value[k * c->n + c->estimates + DRIVER_ESTIMATES] > HYCO_UNSEEN;
   cJSON_AddNumberToObject(all, "unseen", unseen);
   if (unseen) PetscCall(DriverPrint("unseen regime at %d of %d points\n", (int)unseen, (int)n));

@@ -90,10 +90,10 @@ static void Renew(const HycoBlocks *b, PetscInt p, const PetscReal A[], const Pe
 
 /* A: p x rows by columns; r: by row. */
 PetscErrorCode HycoBlocksBalance(const HycoBlocks *b, PetscInt p, const PetscReal A[], const PetscReal f[],
-                                 PetscReal r[], PetscBool *exists)
+                                 PetscReal rounding, PetscReal r[], PetscBool *exists)
 {
   const PetscInt room = 2 * b->n + 2 * p + 1;
-  PetscReal *d, size = 0, rest = 0;
+  PetscReal *d, size = 0, rest = 0, least;
   PetscBool against = PETSC_TRUE, known;
   Rays rays = {0};
 
@@ -105,7 +105,8 @@ PetscErrorCode HycoBlocksBalance(const HycoBlocks *b, PetscInt p, const PetscRea
   PetscCall(PetscArraycpy(d, f, p));
   for (PetscInt i = 0; i < p; i++) size += f[i] * f[i];
   rest = size = PetscSqrtReal(size);
-  for (PetscInt k = 0; k < MOST_STEPS && known && rest > BALANCED * size; k++) {
+  least = PetscMax(BALANCED * size, rounding);
+  for (PetscInt k = 0; k < MOST_STEPS && known && rest > least; k++) {
     Renew(b, p, A, d, &rays, &against);
     if (!against) break;
     PetscCall(HycoNNLS(p, rays.n, rays.column, f, rays.force, &rest));
@@ -118,7 +119,7 @@ PetscErrorCode HycoBlocksBalance(const HycoBlocks *b, PetscInt p, const PetscRea
     rest = PetscSqrtReal(rest);
   }
   /* Not decided: as if there were forces. */
-  *exists = (PetscBool)(!known || against || !(rest > BALANCED * size));
+  *exists = (PetscBool)(!known || against || !(rest > least));
   for (PetscInt j = 0; j < rays.n && !*exists; j++) {
     const PetscInt first = b->row[rays.block[j]];
 

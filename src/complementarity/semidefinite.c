@@ -6,8 +6,12 @@
 
   by the active set method. It starts with every contact closed, so that contact prevents rigid motions if it can, and
   opens those under tension. Where a set does not determine L and x_p (contacts that repeat others, motions that no
-  closed contact prevents), or no set is reached, the proximal point method continues (proximal.c).
+  closed contact prevents), or no set is reached, the proximal point method continues (proximal.c). Its springs carry the
+  round-off of the gaps, which is more than a load that is tiny beside loads that balance themselves: then the primal
+  active set method of quadratic programming (J. Nocedal, S. J. Wright, Numerical Optimization (2006), algorithm 16.3)
+  for min L.S L / 2 + g.L, A L = f', L >= 0, from the forces of a few contacts that balance the load.
 */
+#include <hycoalgorithms.h>
 #include <hycolcp.h>
 #include <petscblaslapack.h>
 
@@ -178,29 +182,269 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The proximal method, and from its set the exact solution, if the set determines it. SolveOnSet() returns singular,
-   hence the negation. */
+/* r = q + M z, for all unknowns. */
+static void Residual(const Floating *h, const PetscReal z[], PetscReal r[])
+{
+  for (PetscInt i = 0; i < h->n; i++) r[i] = h->q[i];
+  for (PetscInt j = 0; j < h->n; j++) {
+    const PetscReal *column = h->M + (size_t)j * (size_t)h->n;
+
+    for (PetscInt i = 0; i < h->n && z[j] != 0; i++) r[i] += column[i] * z[j];
+  }
+}
+
+/* d: the change of z that closes the contacts of the set and balances the load, from r = q + M z. Its round-off is that of
+   r, not of the gaps without forces, which loads that balance themselves may make large. */
+static PetscErrorCode SolveChange(Floating *h, const PetscReal r[], PetscBool active[], PetscReal d[],
+                                  PetscBool *singular)
+{
+  Floating change = *h;
+
+  PetscFunctionBegin;
+  change.q = r;
+  change.z = d;
+  PetscCall(SolveOnSet(&change, active, singular));
+  h->k = change.k;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define SPANS 1e-12 /* squared share of a column that others do not have: above, it is independent of them */
+#define FEW   200   /* closed contacts: with more, the primal method, which changes one at a time, takes too long */
+#define RESTS 1e-9  /* share of the load that no forces balance */
+
+/* The part of column j of A that is independent of `rank` orthonormal Q, as a share of its squared length; it is appended
+   to Q if `append`. */
+static PetscReal Part(const Floating *h, PetscInt j, PetscInt rank, PetscReal Q[], PetscBool append)
+{
+  const PetscReal *A = h->M + (size_t)(h->p + j) * (size_t)h->n;
+  PetscReal *rest = Q + rank * h->p, before = 0, after = 0;
+
+  for (PetscInt i = 0; i < h->p; i++) {
+    rest[i] = A[i];
+    before += A[i] * A[i];
+  }
+  for (PetscInt c = 0; c < 2 * rank; c++) { /* twice, against cancellation */
+    const PetscReal *q = Q + c % rank * h->p;
+    PetscReal dot = 0;
+
+    for (PetscInt i = 0; i < h->p; i++) dot += q[i] * rest[i];
+    for (PetscInt i = 0; i < h->p; i++) rest[i] -= dot * q[i];
+  }
+  for (PetscInt i = 0; i < h->p; i++) after += rest[i] * rest[i];
+  for (PetscInt i = 0; i < h->p && append; i++) rest[i] /= PetscSqrtReal(after);
+  return before > 0 ? after / before : 0;
+}
+
+/* Closes contacts beside those of the set until these meet all motions that any contact meets, always the one that adds
+   most. */
+static PetscErrorCode Span(const Floating *h, PetscBool active[])
+{
+  PetscReal *Q;
+  PetscInt rank = 0, best = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1((h->p + 1) * h->p, &Q));
+  for (PetscInt j = 0; j < h->m && rank < h->p; j++) {
+    if (active[j]) Part(h, j, rank++, Q, PETSC_TRUE);
+  }
+  while (rank < h->p && best >= 0) {
+    PetscReal most = SPANS;
+
+    best = -1;
+    for (PetscInt j = 0; j < h->m; j++) {
+      const PetscReal part = active[j] || h->idle[j] ? 0 : Part(h, j, rank, Q, PETSC_FALSE);
+
+      if (part > most) best = j;
+      most = PetscMax(most, part);
+    }
+    if (best < 0) break;
+    active[best] = PETSC_TRUE;
+    Part(h, best, rank++, Q, PETSC_TRUE);
+  }
+  PetscCall(PetscFree(Q));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Forces L >= 0 of a few contacts that balance the load, and z = (0, L). */
+static PetscErrorCode Begin(Floating *h, PetscBool active[], PetscReal z[], PetscBool *exists)
+{
+  PetscReal *A, *f, size = 0, rest;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(h->p * h->m + 1, &A, h->p, &f));
+  PetscCall(PetscArrayzero(z, h->p));
+  for (PetscInt i = 0; i < h->p; i++) {
+    f[i] = -h->q[i];
+    size += f[i] * f[i];
+  }
+  for (PetscInt j = 0; j < h->m; j++)
+    PetscCall(PetscArraycpy(A + j * h->p, h->M + (size_t)(h->p + j) * (size_t)h->n, h->p));
+  PetscCall(HycoNNLS(h->p, h->m, A, f, z + h->p, &rest));
+  *exists = (PetscBool)(rest <= RESTS * PetscSqrtReal(size));
+  for (PetscInt j = 0; j < h->m; j++) active[j] = (PetscBool)(z[h->p + j] > 0);
+  PetscCall(PetscFree2(A, f));
+  if (*exists) PetscCall(Span(h, active));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the columns of the set span less without contact j: then equilibrium alone determines its force. */
+static PetscErrorCode Needed(const Floating *h, const PetscBool active[], PetscInt j, PetscBool *needed)
+{
+  PetscReal *Q;
+  PetscInt rank = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1((h->p + 1) * h->p, &Q));
+  for (PetscInt i = 0; i < h->m && rank < h->p; i++) {
+    if (active[i] && i != j && Part(h, i, rank, Q, PETSC_TRUE) > SPANS) rank++;
+  }
+  *needed = (PetscBool)(rank < h->p && Part(h, j, rank, Q, PETSC_FALSE) > SPANS);
+  PetscCall(PetscFree(Q));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* z += d as far as no force becomes negative; *whole: all of it. Else the contact whose force becomes 0 leaves the set. The
+   change of a force that equilibrium determines is round-off. */
+static PetscErrorCode Advance(const Floating *h, PetscReal d[], PetscBool active[], PetscReal z[], PetscBool *whole)
+{
+  PetscBool needed = PETSC_TRUE;
+  PetscReal step = 1;
+  PetscInt last = -1;
+
+  PetscFunctionBegin;
+  while (needed) {
+    step = 1;
+    last = -1;
+    for (PetscInt j = h->p; j < h->n; j++) {
+      if (!active[j - h->p] || z[j] + step * d[j] >= 0) continue;
+      step = z[j] / -d[j];
+      last = j;
+    }
+    needed = PETSC_FALSE;
+    if (last >= 0) PetscCall(Needed(h, active, last - h->p, &needed));
+    if (needed) d[last] = 0;
+  }
+  for (PetscInt i = 0; i < h->n; i++) z[i] += i < h->p ? d[i] : step * d[i];
+  *whole = (PetscBool)(last < 0);
+  if (last < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  z[last] = 0;
+  active[last - h->p] = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The open contact that penetrates most at the residual r, or, after many changes, the last one that does; -1: none does. */
+static PetscInt Penetrates(const Floating *h, const PetscBool active[], const PetscReal z[], const PetscReal r[],
+                           PetscBool any)
+{
+  PetscReal size = 0, most;
+  PetscInt worst = -1;
+
+  for (PetscInt i = 0; i < h->n; i++) size = PetscMax(size, PetscAbsReal(i < h->p ? z[i] : h->q[i]));
+  most = -1e-12 * size;
+  for (PetscInt j = 0; j < h->m; j++) {
+    if (active[j] || h->idle[j] || r[h->p + j] >= most) continue;
+    worst = j;
+    if (!any) most = r[h->p + j];
+  }
+  return worst;
+}
+
+/* The primal method. The solution on each set is corrected once before it is judged. */
+static PetscErrorCode Improve(Floating *h, PetscBool active[], PetscReal z[], PetscInt *its, HycoLCPStatus *status)
+{
+  const PetscInt most = 50 + 10 * h->n;
+  PetscReal *r, *d;
+  PetscBool exists = PETSC_FALSE, whole = PETSC_FALSE, corrected = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(h->n, &r, h->n, &d));
+  PetscCall(Begin(h, active, z, &exists));
+  *status = exists ? HYCO_LCP_LIMIT : HYCO_LCP_RAY;
+  for (PetscInt k = 0; k < most && *status == HYCO_LCP_LIMIT; k++) {
+    PetscBool singular = PETSC_FALSE;
+    PetscInt worst = -1;
+
+    Residual(h, z, r);
+    if (whole) worst = Penetrates(h, active, z, r, (PetscBool)(2 * k > most));
+    if (worst >= 0) active[worst] = PETSC_TRUE;
+    if (whole && worst < 0 && corrected) *status = HYCO_LCP_SOLVED;
+    if (*status == HYCO_LCP_SOLVED) break;
+    corrected = (PetscBool)(whole && worst < 0);
+    PetscCall(SolveChange(h, r, active, d, &singular));
+    if (singular || h->k > h->p + FEW) *status = HYCO_LCP_SINGULAR;
+    if (singular) break;
+    PetscCall(Advance(h, d, active, z, &whole));
+    (*its)++;
+  }
+  PetscCall(PetscFree2(r, d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The exact solution on the set, if the set determines it; *exact: no contact violates a condition there. */
+static PetscErrorCode TakeExact(Floating *h, PetscBool active[], PetscBool *singular, PetscBool *exact)
+{
+  PetscBool *violates;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(h->m, &violates));
+  PetscCall(SolveOnSet(h, active, singular));
+  *exact = (PetscBool) !*singular;
+  if (*exact) PetscCall(Violations(h, active, violates));
+  for (PetscInt i = 0; *exact && i < h->m; i++) *exact = (PetscBool)!violates[i];
+  PetscCall(PetscFree(violates));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The proximal method, and from its set the exact solution; without a solution, or with one that its set does not have, the
+   primal method. Where the set leaves a motion free, the nearest solution stays. */
 static PetscErrorCode Continue(const HycoActiveSet *e, const HycoLCP *lcp, PetscBool active[], PetscReal z[],
                                PetscInt *its, HycoLCPStatus *status)
 {
   Floating *h = (Floating *)e->ctx;
   PetscReal *found;
-  PetscBool *set, *violates, exact;
+  PetscBool *set, exact = PETSC_FALSE, singular = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(HycoLCPProximal(lcp, active, z, its, status));
-  if (*status != HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
   HycoDuplicate((size_t)h->n, z, &found);
   HycoDuplicate((size_t)h->m, active, &set);
-  PetscCall(PetscMalloc1(h->m, &violates));
-  PetscCall(SolveOnSet(h, active, &exact));
-  exact = (PetscBool)!exact;
-  if (exact) PetscCall(Violations(h, active, violates));
-  for (PetscInt i = 0; exact && i < h->m; i++) exact = (PetscBool)!violates[i];
-  /* SolveOnSet() has overwritten both z and, of idle contacts, the set. */
+  if (*status == HYCO_LCP_SOLVED) PetscCall(TakeExact(h, active, &singular, &exact));
+  if (!exact && !singular) {
+    HycoLCPStatus other = HYCO_LCP_LIMIT;
+
+    PetscCall(Improve(h, active, z, its, &other));
+    exact = (PetscBool)(other == HYCO_LCP_SOLVED);
+    if (exact) *status = other;
+  }
+  /* Both have overwritten z and the set. */
   if (!exact) PetscCall(PetscArraycpy(z, found, h->n));
   if (!exact) PetscCall(PetscArraycpy(active, set, h->m));
-  HycoFreeAll(&found, &set, &violates);
+  HycoFreeAll(&found, &set);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define UNBALANCED 1e-12 /* share of the terms of equilibrium: more, and the solution is corrected once */
+
+/* Corrects the solution on the set where the round-off of large gaps leaves a part of a tiny load. */
+static PetscErrorCode Correct(Floating *h, PetscBool active[], PetscReal z[])
+{
+  PetscReal *r, *d;
+  PetscBool singular, off = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(h->n, &r, h->n, &d));
+  Residual(h, z, r);
+  for (PetscInt i = 0; i < h->p; i++) {
+    PetscReal size = PetscAbsReal(h->q[i]);
+
+    for (PetscInt j = 0; j < h->n; j++) size += PetscAbsReal(h->M[(size_t)j * (size_t)h->n + (size_t)i] * z[j]);
+    off = (PetscBool)(off || PetscAbsReal(r[i]) > UNBALANCED * size);
+  }
+  if (off) {
+    PetscCall(SolveChange(h, r, active, d, &singular));
+    for (PetscInt i = 0; i < h->n && !singular; i++) z[i] += d[i];
+  }
+  PetscCall(PetscFree2(r, d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -294,6 +538,7 @@ static PetscErrorCode Solve(const HycoLCP *lcp, PetscBool active[], PetscReal z[
   if (h.flexibility == 0) h.flexibility = 1;
   FindIdle(&h);
   PetscCall(HycoActiveSetRun(&e, active, its, status));
+  if (*status == HYCO_LCP_SOLVED) PetscCall(Correct(&h, active, z));
   if (*status != HYCO_LCP_SOLVED && lcp->symmetric) PetscCall(Continue(&e, lcp, active, z, its, status));
   PetscCall(PetscFree3(h.a, h.w, h.idle));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -52,6 +52,7 @@ typedef struct {
   PetscReal *rho, *w, *y, *F;     /* n each; y = z - rho w */
   PetscReal *step, *trial;        /* n; 3 n: z, w and the change of w */
   PetscReal start;                /* the largest force at the start */
+  PetscReal judged;               /* |F| without the round-off of the loads on free unknowns */
   HycoConeStep *linear;
   PetscBool slides; /* no forces balance the loads */
   PetscInt rubs;    /* blocks with friction */
@@ -154,10 +155,11 @@ static PetscErrorCode Slack(Newton *h, const PetscReal z[])
 }
 
 /* y and F at z with the slacks w; *norm = |F|_2, *size: the size of the forces, to which it is compared. F = z - P(z -
-   rho w), zero at a solution; without bounds, as of free unknowns, F = rho w. */
+   rho w), zero at a solution; without bounds, as of free unknowns, F = rho w. Newton's method works on |F|, and the
+   solution is judged without what no forces can balance. */
 static PetscErrorCode Evaluate(Newton *h, const PetscReal z[], PetscReal *norm, PetscReal *size)
 {
-  PetscReal sum = 0, most = 0, least = 0;
+  PetscReal sum = 0, judged = 0, most = 0, least = 0;
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < h->n; i++) h->y[i] = z[i] - h->rho[i] * h->w[i];
@@ -170,10 +172,12 @@ static PetscErrorCode Evaluate(Newton *h, const PetscReal z[], PetscReal *norm, 
   for (PetscInt i = 0; i < h->n; i++) {
     h->F[i] = z[i] - h->F[i];
     sum += h->F[i] * h->F[i];
+    judged += PetscSqr(PetscMax(PetscAbsReal(h->F[i]) - (i < h->p ? h->lcp->rounding : 0), 0));
     if (i >= h->p) most = PetscMax(most, PetscAbsReal(z[i]));
     least = PetscMax(least, PetscAbsReal(h->rho[i] * h->q[i]));
   }
   *norm = PetscSqrtReal(sum);
+  h->judged = PetscSqrtReal(judged);
   /* Forces that cancel, or vanish, leave round-off of the size of those that would close the gaps, or were there
      before. */
   *size = most > 0 ? PetscMax(most, GAPS * PetscMax(least, h->start)) : PetscMax(least, GAPS * h->start);
@@ -326,7 +330,7 @@ static PetscErrorCode Iterate(Newton *h, PetscReal z[], HycoLCPStatus *status)
     PetscCall(Show(h, z, changes));
   }
   /* By the residual alone, whatever ended the loop. */
-  *status = norm <= SOLVED * size ? HYCO_LCP_SOLVED : regular ? HYCO_LCP_LIMIT : HYCO_LCP_SINGULAR;
+  *status = h->judged <= SOLVED * size ? HYCO_LCP_SOLVED : regular ? HYCO_LCP_LIMIT : HYCO_LCP_SINGULAR;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -491,7 +495,7 @@ static PetscErrorCode Take(Newton *h, const PetscReal x[], PetscReal z[], HycoLC
 
   PetscFunctionBegin;
   PetscCall(Residual(h, x, &norm, &size));
-  *status = norm <= SOLVED * size ? HYCO_LCP_SOLVED : HYCO_LCP_LIMIT;
+  *status = h->judged <= SOLVED * size ? HYCO_LCP_SOLVED : HYCO_LCP_LIMIT;
   if (*status == HYCO_LCP_SOLVED) PetscCall(PetscArraycpy(z, x, h->n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -715,7 +719,7 @@ static PetscErrorCode Proximal(Newton *h, PetscReal z[], HycoLCPStatus *status)
     Pose(h, h->M0, h->q0);
     PetscCall(Residual(h, z, &norm, &size));
     /* The status of the original problem, not of the proximal one. */
-    *status = norm <= SOLVED * size ? HYCO_LCP_SOLVED : HYCO_LCP_LIMIT;
+    *status = h->judged <= SOLVED * size ? HYCO_LCP_SOLVED : HYCO_LCP_LIMIT;
     done = (PetscBool)(done || norm <= TIGHT * size || (*status == HYCO_LCP_SOLVED && norm > before / 2));
     before = norm;
     if (*status == HYCO_LCP_SOLVED || norm > CLOSE * size) continue;
@@ -741,7 +745,7 @@ static PetscErrorCode SlidesAway(Newton *h, PetscReal z[])
     f[i] = -h->q0[i];
     for (PetscInt j = 0; j < rows; j++) A[j * p + i] = h->M0[(size_t)(p + j) * (size_t)h->n + (size_t)i];
   }
-  PetscCall(HycoBlocksBalance(h->blocks, p, A, f, r, &exists));
+  PetscCall(HycoBlocksBalance(h->blocks, p, A, f, h->lcp->rounding * h->flexibility, r, &exists));
   h->slides = (PetscBool)!exists;
   if (h->slides) PetscCall(PetscArraycpy(z + p, r, rows));
   PetscCall(PetscFree3(A, f, r));

@@ -27,6 +27,12 @@ void HycoPathErrorsJudge(PetscInt n, const HycoLost lost[], HycoPathErrors *e)
   }
 }
 
+/* Of an arbitrary position there is no error: full order has chosen another one. */
+void HycoTraceForgive(HycoROM m, PetscInt step, HycoLost lost[])
+{
+  if (m->trace.loose[step]) lost[HYCO_ERROR_U].lost = lost[HYCO_ERROR_U_RID].lost = 0;
+}
+
 /* The full-order path on rank 0, stored as its listed times are reached. */
 typedef struct {
   PetscInt n_dof, n_sigma, n_cells, n_contacts, n;
@@ -97,6 +103,7 @@ static PetscErrorCode Measure(HycoROM m, const Kept *kept, PetscInt k, HycoLost 
   }
   PetscCall(HycoROMMeasureRID(m, u_rid, sigma_rid, inelastic_rid, lambda, lost));
   lost[HYCO_ERROR_U] = (HycoLost){PetscSqrtReal(square[0]), PetscSqrtReal(square[1])};
+  HycoTraceForgive(m, k, lost);
   PetscCall(PetscFree3(u_rid, sigma_rid, inelastic_rid));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

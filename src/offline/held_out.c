@@ -94,6 +94,7 @@ static PetscErrorCode MeasureStep(Rows *r, const PetscReal mu[], PetscInt step, 
   PetscCall(HycoROMMeasureRID(r->m, r->c.rid[0], r->c.rid[1], r->c.rid[2], lambda, lost));
   /* Squares of the whole mesh, which all ranks have summed. */
   lost[HYCO_ERROR_U] = (HycoLost){PetscSqrtReal(square[0]), PetscSqrtReal(square[1])};
+  HycoTraceForgive(r->m, step, lost);
   /* Forces that are not unique differ without an error. */
   if (r->m->trace.history.step[step].n_dependent > 0)
     lost[HYCO_ERROR_LAMBDA].lost = lost[HYCO_ERROR_LAMBDA_RID].lost = 0;
@@ -144,6 +145,7 @@ static PetscErrorCode ComparePath(Rows *r, const PetscReal mu[], PetscMPIInt of,
     PetscCall(MeasureU(r, mu, k, of, square));
     HycoOnEach(HycoComm(r->t), mine ? MeasureStep(r, mu, k, square, lost + k * HYCO_N_ERRORS) : PETSC_SUCCESS);
   }
+  if (mine) row->loose = r->m->prediction.loose && row->converged > 0;
   HycoOnEach(HycoComm(r->t), mine ? ConcludePath(r->m, n, lost, row) : PETSC_SUCCESS);
   PetscCall(PetscFree(lost));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -54,7 +54,8 @@ static PetscErrorCode PathErrors(HycoReducer t, HycoROM m, PetscInt k, PetscReal
   for (PetscInt j = 0; j < m->trace.n_listed; j++) {
     PetscCall(HycoROMSetStep(m, j));
     SnapshotErrors(t, m, first + j, &eu, &el);
-    if (size[0] > 0) *u = PetscMax(*u, eu * t->U_norm[first + j] / PetscMax(t->U_norm[first + j], 0.1 * size[0]));
+    if (size[0] > 0 && !m->trace.loose[j])
+      *u = PetscMax(*u, eu * t->U_norm[first + j] / PetscMax(t->U_norm[first + j], 0.1 * size[0]));
     if (force[j] > 0) el *= force[j] / PetscMax(force[j], HYCO_SMALL_FORCE * size[1]);
     /* Without a force in the path's solution at this time there is nothing to compare with. */
     if (force[j] > 0) *lambda = PetscMax(*lambda, el);

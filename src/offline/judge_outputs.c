@@ -210,8 +210,8 @@ static PetscErrorCode JudgeOne(Outputs *o, const PetscReal mu[], HycoOutputError
 
     PetscCall(MeasureStored(o, mu, k, value));
     for (PetscInt q = 0; q < n_q; q++) {
-      const PetscBool arbitrary =
-          (PetscBool)(m->prediction.loose && HycoQuantityOfDisplacement(&m->model->scene->quantity[q]));
+      const PetscBool arbitrary = (PetscBool)((m->model->scene->n_times ? m->trace.loose[k] : m->prediction.loose) &&
+                                              HycoQuantityOfPosition(&m->model->scene->quantity[q]));
       const PetscReal error = arbitrary ? 0 : PetscAbsReal(found[q] - value[q]), size = PetscAbsReal(value[q]);
 
       /* A comparison with NaN is false: it must be kept by name. */

@@ -118,9 +118,9 @@ PetscBool HycoQuantityOfStress(const HycoQuantity *q)
   return (PetscBool)(q->kind <= HYCO_QUANTITY_MEAN && q->field >= XX);
 }
 
-PetscBool HycoQuantityOfDisplacement(const HycoQuantity *q)
+PetscBool HycoQuantityOfPosition(const HycoQuantity *q)
 {
-  return (PetscBool)(q->kind <= HYCO_QUANTITY_MEAN && q->field < XX);
+  return (PetscBool)((q->kind <= HYCO_QUANTITY_MEAN && q->field < XX) || q->kind == HYCO_QUANTITY_FRICTION);
 }
 
 /* A subset of HycoQuantitiesMarkCells(): stresses cost more to store than displacements, and outputs of

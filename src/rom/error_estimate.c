@@ -401,7 +401,7 @@ PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
   /* Full order may choose another position. */
   if (p->loose) p->estimated_error_u = -1;
   for (PetscInt q = 0; p->loose && q < m->model->scene->n_quantities; q++) {
-    if (HycoQuantityOfDisplacement(&m->model->scene->quantity[q])) p->estimated_error_quantity[q] = -1;
+    if (HycoQuantityOfPosition(&m->model->scene->quantity[q])) p->estimated_error_quantity[q] = -1;
   }
   /* Full order may find other nodal forces, as far away as they are. */
   if (p->n_dependent > 0) p->estimated_error_lambda = -1;

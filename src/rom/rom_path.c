@@ -11,7 +11,7 @@ PetscErrorCode HycoTraceFree(HycoROM m)
 
   PetscFunctionBegin;
   m->pairs.shear = m->whole_pairs.shear = NULL;
-  HycoFreeAll(&r->t, &r->gamma, &r->U_fe, &r->at, &r->Lambda, &r->sigma, &r->inelastic, &r->shear, &r->step);
+  HycoFreeAll(&r->t, &r->gamma, &r->U_fe, &r->at, &r->loose, &r->Lambda, &r->sigma, &r->inelastic, &r->shear, &r->step);
   *r = empty;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -29,6 +29,7 @@ PetscErrorCode HycoTraceBegin(HycoROM m)
   PetscCall(PetscFree(r->step));
   if (r->at) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(n_times + 1, &r->at)); /* one more: the end of a path that ends early */
+  PetscCall(PetscMalloc1(n_times + 1, &r->loose));
   PetscCall(PetscMalloc1((size_t)(n_times + 1) * (size_t)m->model->pairs.n + 1, &r->Lambda));
   PetscCall(PetscMalloc1((size_t)(n_times + 1) * (size_t)(m->model->mesh->n_cells * m->fe->n_sigma) + 1, &r->sigma));
   PetscCall(PetscMalloc1((size_t)(n_times + 1) * (size_t)m->model->mesh->n_cells + 1, &r->inelastic));
@@ -68,6 +69,7 @@ PetscErrorCode HycoTraceList(HycoROM m, PetscReal **sigma, PetscReal **inelastic
   PetscFunctionBegin;
   /* The last accepted step is the one that has just reached the listed time. */
   r->at[r->n_listed] = r->n - 1;
+  r->loose[r->n_listed] = PETSC_FALSE; /* unless the type knows better */
   r->shown = r->n_listed++;
   PetscCall(PetscArraycpy(r->Lambda + k * (size_t)m->model->pairs.n, m->Lambda, m->model->pairs.n));
   *sigma = r->sigma + k * n_cells * (size_t)m->fe->n_sigma;

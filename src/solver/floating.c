@@ -96,7 +96,7 @@ static PetscErrorCode Slides(HycoSystem y, PetscInt p, const Vec z[], Vec L, Pet
   PetscCall(PetscMalloc3(p * y->m, &A, p, &f, y->m, &row));
   PetscCall(HycoMotionRows(y->B, p, z, y->work_L, A));
   for (PetscInt i = 0; i < p; i++) PetscCall(VecDot(y->F, z[i], &f[i]));
-  PetscCall(HycoBlocksBalance(blocks, p, A, f, row, &exists));
+  PetscCall(HycoBlocksBalance(blocks, p, A, f, 0, row, &exists));
   *slides = (PetscBool)!exists;
   if (*slides) PetscCall(HycoBlocksLeaveSlide(blocks, p, A, f, row));
   PetscCall(VecGetOwnershipRange(L, &lo, &hi));

@@ -143,6 +143,46 @@ class Overhang(Case):
         fit = self.hyco('fit', '-model', 'm.h5', '-target_rise', repr(full['outputs']['rise']), '-hold_soft', 1, '-mu_load', 0)
         self.near(fit['mu']['load'], 0.01, 1e-4)
 
+    def test_tiny_loads(self):
+        """A plug in a turned V groove under pressures on its sides that balance themselves and a load on top that is 1e-12 to 1e-3 of them, in all points of sets of
+        models, without friction and with it along a path: a solution everywhere, and forces that balance the load; a position that no
+        force determines is named and not compared."""
+        grid, sides = Grid(), np.linspace(-1, 1, 9)
+        turn = lambda x, y: 0.37 * np.stack([np.cos(0.3) * x - np.sin(0.3) * y, np.sin(0.3) * x + np.cos(0.3) * y], -1)
+        grid.box('quad4', [sides, np.append(np.linspace(0, 1, 9), [1.3, 1.6])], lambda p: turn(p[:, 0] * np.minimum(6 + 10 * p[:, 1], 16), 6 + 10 * p[:, 1]), 'plug',
+                 {'x0': ('left', 8), 'x1': ('right', 8), 'y1': 'top'})
+        for side in (1, 89):  # the first nodes of the plug's sides; above the flanks
+            grid._cells(('line2', ((0, 1),)), side + np.arange(8, 11), grid._tag('sides', 1))
+        grid.box('quad4', [np.linspace(-1, 1, 25), np.linspace(0, 1, 4)], lambda p: turn(22 * p[:, 0], -8 + p[:, 1] * (8 + 22 * abs(p[:, 0]))), 'groove',
+                 {'y1': 'wall', 'y0': 'base'})
+        scene = """
+scene: {mesh: mesh.msh, parameters: [press, squeeze, soft]}
+parameter: {press: {range: [0, 50]}, squeeze: {range: [-40, 40]}, soft: {range: [0.5, 2]}}
+body: {plug: {young: 2.1e5}, groove: {young: 1e5*soft, poisson: 0.33}}
+fixed: {base: {x: 0, y: 0}}
+pressure: {top: press*a, sides: squeeze*b}
+contact: {l: {type: surface, slave: left, master: wall, tolerance: 1, friction: mu}, r: {type: surface, slave: right, master: wall, tolerance: 1, friction: mu}}
+history: {times: [0, 1, 2, 3, 4, 5], tables: {a: [[0, 0], [1, 1], [3, 1], [4, 0], [5, 0.5]], b: [[0, 0], [2, 1], [3, -1], [5, 1]]}}
+"""
+        self.written(scene.replace('soft]', 'mu]').replace('soft: {range: [0.5, 2]}', 'mu: {range: [0, 0.4]}').replace('*soft', ''), grid)
+        with open(self.path('smooth.yaml'), 'w', encoding='ascii') as file:
+            file.write(scene[:scene.index('history')].replace(', friction: mu', '').replace('*a', '').replace('*b', ''))
+        for name, number, more in (('smooth', 6, ('-values_press', '1e-11,1e-10,1e-9,1e-8,1e-7,1e-3', '-values_soft', '0.5,0.6,0.7,0.83,1,1.2,1.4,1.7,2')),
+                                   ('scene', 8, ('-values_press', '1e-8,1e-7,1e-5,1e-4,1e-3,1', '-values_mu', '0,0.05,0.2,0.4'))):
+            self.hyco('train', '-scene', f'{name}.yaml', '-scatter', number, '-model', self.path(f'{name}.h5'), '-hyco_model_type', 'bodies')
+            run = self.run_raw('predict', '-model', f'{name}.h5', *more, '-values_squeeze', '-40,-21,-13.7,-3,0.1,7.3,17,40', '-table', self.path('t.csv'))
+            self.assertEqual(run.returncode, 0, run.stderr)
+            if name == 'smooth':
+                rows = np.genfromtxt(self.path('t.csv'), delimiter=',', names=True)
+                clear = rows['press'] > 5e-10
+                np.testing.assert_allclose(rows['total_contact_force'][clear], 32 * 0.37 * np.sqrt(2) * rows['press'][clear], rtol=1e-3)
+        # without a force, or with too few of them, displacements are arbitrary: they are not compared
+        report = self.hyco('compare', '-scene', 'scene.yaml', '-model', 'scene.h5', '-values_press', '0,20', '-values_squeeze', -40, '-values_mu', 0)
+        self.assertEqual(report['estimates']['position_arbitrary'], 1)
+        self.assertLess(report['worst_u']['max'], 1e-6)
+        report = self.hyco('predict', '-model', 'scene.h5', '-mu', '0,-40,0')
+        self.assertEqual((report['position_arbitrary'], report['estimated_error_u']), (True, None))
+
     def test_balanced(self):
         """Loads that are in equilibrium with themselves press no body, in all points of a set and in a model: no forces, no contact closed, the body stays. A ring
         between two plates under pressure inside; a block in a corner, pushed along one side of it only: its forces and the load agree."""

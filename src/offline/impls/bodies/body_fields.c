@@ -78,7 +78,7 @@ static PetscErrorCode SolvePath(HycoBodiesFriction f, HycoBodiesWork o, HycoScen
     PetscCall(HycoBodiesFrictionPrepare(f, o, all));
     PetscCall(HycoBodiesFrictionSolve(f, o, t, &kkt, &its, solved));
     if (!*solved) break;
-    PetscCall(HycoBodiesFrictionAccept(f, t));
+    PetscCall(HycoBodiesFrictionAccept(f, o, t));
     /* Another time within each quarter for each point: all times are seen, not four of them. */
     /* Samples of forces are spread over the path. */
     if (t >= first + (last - first) * (seen + SomeShare(k)) / SEEN && seen < SEEN) {

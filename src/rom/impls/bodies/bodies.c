@@ -149,8 +149,8 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
   PetscCall(HycoBodiesLoose(o, m->model->pairs.n, m->Lambda, &p->loose));
   p->iterations = o->its;
   p->reason = solved && HycoKKTMax(&p->kkt) > m->solver->rtol ? HYCO_DIVERGED_RESIDUAL : o->reason;
-  /* As at full order: a method that ends without an answer of its own may have found it. */
-  if (p->reason == HYCO_DIVERGED_RESIDUAL && HycoKKTMax(&p->kkt) <= m->solver->rtol) p->reason = HYCO_CONVERGED;
+  /* As at full order: a method that ends without an answer of its own may have found it, but not beside the surfaces. */
+  if (!o->lacks && HycoKKTMax(&p->kkt) <= m->solver->rtol) p->reason = HYCO_CONVERGED;
   PetscCall(PetscStrncpy(p->method, o->method, sizeof(p->method)));
   p->seconds.solve = HycoNow() - solve;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -101,7 +101,7 @@ PetscErrorCode HycoBodiesFrictionBegin(HycoBodiesFriction f)
   PetscCall(PetscArrayzero(f->U_old, f->normal.fe->n_dof));
   PetscCall(PetscArrayzero(f->forces, f->all.n));
   f->n_taken = 0;
-  f->present = PETSC_FALSE;
+  f->present = f->loose = f->adrift = PETSC_FALSE;
   HycoConeFactorForget(f->factor); /* a path does not depend on those before */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -262,6 +262,7 @@ PetscErrorCode HycoBodiesFrictionTouch(HycoBodiesFriction f, HycoBodiesWork o, P
                  .symmetric = PETSC_TRUE,
                  .blocks = f->blocks,
                  .cone = f->factor,
+                 .rounding = HycoBodiesLoadRounding(o),
                  .warm = PETSC_TRUE,
                  .given = PETSC_TRUE};
 
@@ -410,7 +411,7 @@ PetscErrorCode HycoBodiesFrictionSlides(HycoBodiesFriction f, HycoBodiesWork o, 
   PetscCall(PetscMalloc3(p * n, &A, p, &load, n, &r));
   for (PetscInt i = 0; i < p; i++) load[i] = -f->q[i];
   MotionRows(f, A);
-  PetscCall(HycoBlocksBalance(f->blocks, p, A, load, r, &exists));
+  PetscCall(HycoBlocksBalance(f->blocks, p, A, load, HycoBodiesLoadRounding(o), r, &exists));
   *slides = (PetscBool)!exists;
   if (*slides) {
     PetscReal size = 0;
@@ -470,13 +471,58 @@ PetscErrorCode HycoBodiesFrictionDerive(HycoBodiesFriction f, PetscInt m, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+#define HOLDS 1e-10 /* share of the largest force below which a force holds nothing */
+#define EDGE  1e-6  /* of the tangential force: nearer to the border of the cone a contact slips */
+
+/* Whether the contacts with a force, and of these the tangents that stick, leave a rigid motion free: the slips of later states
+   begin from there. Without any force bodies stay where they are, but for what loads that balance themselves ask for. */
+static PetscErrorCode FindLoose(HycoBodiesFriction f, HycoBodiesWork o)
+{
+  const PetscInt p = f->p;
+  const PetscReal *L = f->z + p;
+  PetscReal *A, *gram, *all, most = 0;
+  PetscBool held;
+
+  PetscFunctionBegin;
+  if (!p) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt k = 0; k < f->slip.n; k++) most = PetscMax(most, L[f->slip.row[k]]);
+  f->adrift = (PetscBool)(!(most > 0) && (f->adrift || HycoBodiesLoaded(o)));
+  if (!(most > 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc3(p * f->all.n, &A, p * p, &gram, p, &all));
+  MotionRows(f, A);
+  for (PetscInt k = 0; k < f->slip.n; k++) {
+    const PetscInt first = f->slip.row[k], end = f->slip.row[k + 1];
+    PetscReal shear = 0;
+
+    for (PetscInt r = first + 1; r < end; r++) shear += L[r] * L[r];
+    for (PetscInt r = first; r < end; r++) {
+      const PetscReal *a = A + r * p;
+      const PetscBool holds = (PetscBool)(L[first] > HOLDS * most &&
+                                          (r == first || PetscSqrtReal(shear) < (1 - EDGE) * f->slip.mu[k] * L[first]));
+
+      for (PetscInt i = 0; i < p; i++) all[i] += a[i] * a[i];
+      for (PetscInt i = 0; i < p * p && holds; i++) gram[i] += a[i / p] * a[i % p];
+    }
+  }
+  PetscCall(HycoCholesky("U", p, gram, all, &held));
+  f->loose = (PetscBool)(f->loose || !held);
+  PetscCall(PetscFree3(A, gram, all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscBool HycoBodiesFrictionLoose(HycoBodiesFriction f)
+{
+  return (PetscBool)(f->loose || f->adrift);
+}
+
 /* Slip, forces and displacements change here only, so that a halved step repeats from the same state. */
-PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction f, PetscReal t)
+PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction f, HycoBodiesWork o, PetscReal t)
 {
   const PetscReal *L = f->z + f->p;
   const size_t n = (size_t)(f->p + f->all.n);
 
   PetscFunctionBegin;
+  PetscCall(FindLoose(f, o));
   if (f->n_taken == f->room) {
     f->room = 2 * f->room + 64;
     PetscCall(PetscRealloc((size_t)f->room * n * sizeof(PetscReal) + 1, &f->taken));

@@ -25,6 +25,8 @@ struct _n_HycoBodiesFriction {
   PetscReal *w, *forces;         /* by row: of the last accepted step */
   PetscReal most;                /* largest displacement */
   PetscInt n_taken, room;        /* accepted steps, and room for them */
+  PetscBool loose;               /* an accepted state with forces left a motion free */
+  PetscBool adrift;              /* the last one has no forces, but loads */
   PetscReal *taken;              /* by accepted step: p + rows, its motions and forces */
   HycoBodiesAlong along;         /* NULL: no derivatives have been asked for; bodies_along.c frees it */
 };

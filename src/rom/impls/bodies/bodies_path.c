@@ -157,7 +157,7 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
   if (w->friction) {
     PetscBool disproven;
 
-    PetscCall(HycoBodiesFrictionAccept(w->friction, p->t));
+    PetscCall(HycoBodiesFrictionAccept(w->friction, &w->bodies, p->t));
     PetscCall(HycoBodiesFrictionDisproven(w->friction, &disproven));
     p->now.disproven += disproven;
   }
@@ -217,6 +217,7 @@ static PetscErrorCode Record(HycoPath p)
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const HycoRows *rows = w->surface.rows;
   const PetscScalar *alpha;
+  PetscBool *loose;
 
   PetscFunctionBegin;
   PetscCall(HycoVecRead(p->Lambda, m->model->pairs.n, m->Lambda));
@@ -230,6 +231,12 @@ static PetscErrorCode Record(HycoPath p)
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
   PetscCall(HycoTraceRecord(m, PETSC_TRUE, p->begin, &p->now));
   if (w->friction) PetscCall(RecordFriction(m, &p->now));
+  loose = &m->trace.loose[m->trace.n_listed - 1];
+  if (w->friction)
+    *loose = HycoBodiesFrictionLoose(w->friction);
+  else if (p->now.total_contact_force > 0 || HycoBodiesLoaded(&w->bodies))
+    PetscCall(HycoBodiesLoose(&w->bodies, w->surface.n, m->Lambda, loose));
+  m->prediction.loose = (PetscBool)(m->prediction.loose || *loose);
   PetscCall(HycoRowsCountDependent(w->surface.n, rows->start, rows->dof, rows->value, rows->gap, m->fe->n_dof, m->U,
                                    m->Lambda, w->friction ? HycoBodiesFrictionSlip(w->friction) : NULL,
                                    &p->now.n_dependent));

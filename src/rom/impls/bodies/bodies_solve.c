@@ -367,6 +367,7 @@ static PetscErrorCode Load(HycoBodiesWork o)
    carry that of the interpolation of the loads. */
 #define BALANCED 1e-11
 #define LEFT     1e-12
+#define ROUNDED  1e-13 /* the same of a work that is not small */
 
 /* The work of the loads on motion i; 0 where vectors of the basis cancel, as it is of a load that does not act on it. */
 PetscReal HycoBodiesLoadWork(HycoBodiesWork o, PetscInt i)
@@ -381,6 +382,25 @@ PetscReal HycoBodiesLoadWork(HycoBodiesWork o, PetscInt i)
     terms += PetscAbsReal(term);
   }
   return PetscAbsReal(sum) > BALANCED * terms ? sum : 0;
+}
+
+/* The round-off of these works: loads that balance themselves leave it beside the work of tiny ones. */
+PetscReal HycoBodiesLoadRounding(HycoBodiesWork o)
+{
+  const HycoSubstructures b = o->bodies;
+  PetscReal all = 0, most = 0;
+
+  for (PetscInt j = 0; j < b->r; j++) all += PetscAbsReal(o->c[j]);
+  for (PetscInt i = 0; i < b->p * b->r; i++) most = PetscMax(most, PetscAbsReal(o->work[i]));
+  return ROUNDED * most * all;
+}
+
+PetscBool HycoBodiesLoaded(HycoBodiesWork o)
+{
+  PetscReal all = 0;
+
+  for (PetscInt j = 0; j < o->bodies->r; j++) all += PetscAbsReal(o->c[j]);
+  return (PetscBool)(all > 0);
 }
 
 /* The rigid motions at mu, and the work of the loads on them. */
