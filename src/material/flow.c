@@ -390,7 +390,7 @@ static void ByData(const HycoFlowRule *rule, const HycoFlowPoint *p, const HycoM
 
 /* A point's solved step: with the flow's equations at it. */
 typedef struct {
-  Work w;
+  Radial w;
   PetscReal creep, plastic, q, slope, yield, hardening, G, bulk; /* slope: of creep by q; yield < 0: none */
   PetscBool yields;                                              /* the equations are those of yielding */
 } Solved;
@@ -399,7 +399,7 @@ typedef struct {
 static PetscBool Yields(const HycoFlowRule *rule, Solved *s)
 {
   PetscReal before, hardening;
-  Work w = s->w;
+  Radial w = s->w;
 
   if (!rule->yield || !(w.trial > 0)) return PETSC_FALSE;
   before = (*rule->yield)(&w.p, w.p.plastic0, &hardening);
