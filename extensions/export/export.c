@@ -1128,8 +1128,9 @@ static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
 
     HycoCheck(worst[k] <= (e->flows ? FLOWS_AGREE : AGREES) * scale,
               "export: the output %s of the program differs from the model's by %.1e of its largest value; the forces "
-              "may not be unique",
-              e->out.name[k], (double)(worst[k] / scale));
+              "may not be unique%s",
+              e->out.name[k], (double)(worst[k] / scale),
+              e->flows ? ", or the choice of time steps hangs on the last digits" : "");
     if (scale > 0) e->out.difference = PetscMax(e->out.difference, worst[k] / scale);
   }
   PetscCall(PetscFree4(mine, theirs, most, worst));

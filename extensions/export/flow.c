@@ -58,41 +58,28 @@ static PetscErrorCode FindPoints(HycoFlows f, HycoExportModel *out)
 {
   const HycoBodiesInelastic in = f->path->bodies.bodies->inelastic;
   const HycoMesh mesh = f->m->fe->mesh;
-  const PetscInt nq = HycoElementGet(mesh->type)->nq, n_bodies = f->m->model->scene->n_bodies, l = f->n_modes,
-                 ns = f->m->fe->n_sigma;
+  const PetscInt nq = HycoElementGet(mesh->type)->nq, cells = f->outputs ? f->outputs->mesh->n_cells : 0;
   PetscBool *chosen, *marked;
-  PetscInt n = 0;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc2(mesh->n_cells * nq, &chosen, f->outputs ? f->outputs->mesh->n_cells : 0, &marked));
-  PetscCall(PetscMalloc1(in->n_points * ns * l + 1, &out->m.T));
-  for (PetscInt b = 0; b < n_bodies; b++) {
-    for (PetscInt i = 0; i < in->n_points; i++) {
-      const PetscInt at = f->path->point[i];
+  PetscCall(PetscCalloc2(mesh->n_cells * nq, &chosen, cells, &marked));
+  HycoDuplicate(in->n_points * f->m->fe->n_sigma * f->n_modes, f->path->T, &out->m.T);
+  out->m.n_chosen = (int)in->n_points;
+  for (PetscInt i = 0; i < in->n_points; i++) {
+    const PetscInt at = f->path->point[i];
 
-      if (mesh->cell_body[at / nq] != b) continue;
-      chosen[at] = PETSC_TRUE;
-      PetscCall(PetscArraycpy(out->m.T + n++ * ns * l, f->path->T + i * ns * l, ns * l));
-      PetscCall(AddPoint(f, PETSC_FALSE, at / nq, at % nq));
-    }
+    chosen[at] = PETSC_TRUE;
+    PetscCall(AddPoint(f, PETSC_FALSE, at / nq, at % nq));
   }
-  for (PetscInt k = 0; k < n_bodies * mesh->n_cells * nq; k++) {
-    const PetscInt at = k % (mesh->n_cells * nq), e = at / nq;
-
-    if (mesh->cell_body[e] == k / (mesh->n_cells * nq) && HycoInelasticFlows(f->m->fe, e) && !chosen[at])
-      PetscCall(AddPoint(f, PETSC_FALSE, e, at % nq));
+  for (PetscInt at = 0; at < mesh->n_cells * nq; at++) {
+    if (HycoInelasticFlows(f->m->fe, at / nq) && !chosen[at]) PetscCall(AddPoint(f, PETSC_FALSE, at / nq, at % nq));
   }
   f->n_settled = f->n_points;
   if (f->outputs) PetscCall(MarkCells(f, marked));
-  for (PetscInt k = 0; f->outputs && k < n_bodies * f->outputs->mesh->n_cells; k++) {
-    const PetscInt e = k % f->outputs->mesh->n_cells;
-
-    if (f->outputs->mesh->cell_body[e] != k / f->outputs->mesh->n_cells || !marked[e] ||
-        !HycoInelasticFlows(f->outputs, e))
-      continue;
-    for (PetscInt q = 0; q < nq; q++) PetscCall(AddPoint(f, PETSC_TRUE, e, q));
+  for (PetscInt at = 0; at < cells * nq; at++) {
+    if (marked[at / nq] && HycoInelasticFlows(f->outputs, at / nq))
+      PetscCall(AddPoint(f, PETSC_TRUE, at / nq, at % nq));
   }
-  out->m.n_chosen = (int)n;
   PetscCall(PetscFree2(chosen, marked));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

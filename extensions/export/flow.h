@@ -12,7 +12,7 @@ typedef struct {
   PetscInt cell, q;
   PetscReal *B, share;
 } FlowPoint;
-/* Chosen points, the others of their cells, those of outputs; each kind by body. */
+/* Chosen points, the others of their cells, those of outputs. */
 typedef struct {
   HycoROM m;
   HycoBodiesPath path;
