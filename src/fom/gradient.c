@@ -10,6 +10,7 @@
 */
 #include "along.h"
 
+#define CLOSED  1e-7 /* share of the largest gap below which one is closed */
 #define NOTHING 1e-8 /* share of an output's largest value below which it is round-off, as is a change over the range */
 
 typedef struct {
@@ -27,7 +28,8 @@ typedef struct {
   PetscReal *output;      /* 6 x n_outputs: at the three points, at closer ones */
   PetscBool stress;       /* the caller may hold the stresses */
   PetscBool rubs;         /* L has the rows of tangents */
-  PetscBool regular;      /* the contacts determine the derivatives */
+  PetscBool regular;      /* the contacts determine the derivatives; */
+  PetscBool idle;         /* of a path: they do not, but nothing loads or moves the bodies */
   PetscInt parameter;     /* that is moved, */
   PetscReal step;         /* by how much, */
   PetscBool forces, all;  /* whether it changes those of the bodies, of all cells */
@@ -288,6 +290,30 @@ static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *turns
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Bodies at rest that contact alone holds: a change of the loads, or of a gap that is closed, has no derivative. Collective. */
+static PetscErrorCode Rest(Work *o)
+{
+  const PetscScalar *w, *g;
+  PetscReal most, load;
+  PetscInt rows;
+
+  PetscFunctionBegin;
+  PetscCall(VecNorm(o->r, NORM_INFINITY, &load));
+  PetscCall(VecNorm(o->g, NORM_INFINITY, &most));
+  PetscCall(VecGetLocalSize(o->L, &rows));
+  PetscCall(VecGetArrayRead(o->W[0], &w));
+  PetscCall(VecGetArrayRead(o->g, &g));
+  o->regular = (PetscBool)(load == 0);
+  for (PetscInt k = 0; k < rows; k++)
+    o->regular = (PetscBool)(o->regular && (w[k] > CLOSED * o->size || PetscAbsReal(g[k]) <= NOTHING * most));
+  PetscCall(VecRestoreArrayRead(o->g, &g));
+  PetscCall(VecRestoreArrayRead(o->W[0], &w));
+  HycoAllreduce(&o->regular, 1, HYCO_MPI_BOOL, MPI_LAND, HycoComm(o->f));
+  PetscCall(VecSet(o->dU, 0));
+  PetscCall(VecSet(o->dL, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The solution's change. *kink: an undecided contact takes another state towards the two sides. With friction, which
    remembers where it was, such steps have no derivative. Collective. */
 static PetscErrorCode Solve(Work *o, const HycoDifference *d, PetscBool *kink)
@@ -299,6 +325,10 @@ static PetscErrorCode Solve(Work *o, const HycoDifference *d, PetscBool *kink)
   if (o->rubs) {
     PetscCall(HycoSolverTangentSolveCones(o->tangent, o->r, o->g, o->dC, d->step[1], o->dU, o->dL, o->dW, &o->regular));
     if (o->regular) PetscCall(HycoAlongSpend(o->along, d->parameter, o->L, o->W[0], o->dL, o->dW));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (o->idle) {
+    PetscCall(Rest(o));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(HycoSolverTangentSolve(o->tangent, o->r, o->g, d->sign, o->dU, o->dL, kink));
@@ -372,13 +402,40 @@ static PetscErrorCode CreateContacts(Work *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The system of the closed contacts. Where forces hold a body only by round-off the matrix may be regular. Collective. */
+static PetscErrorCode Determine(Work *o)
+{
+  HycoFOM f = o->f;
+  char name[HYCO_LINE] = "";
+  PetscReal most = 0, moved;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSolverTangentCreate(o->along ? f->path->solver : f->solver, o->U, o->L,
+                                    o->rubs ? HycoFrictionBefore(f->friction) : NULL, &o->tangent, &o->regular));
+  if (!f->n_contacts || o->rubs) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecNorm(o->L, NORM_INFINITY, &most));
+  if (most > 0 && (!o->regular || !HycoSolverTangentUndecided(o->tangent))) PetscCall(HycoFOMNameLoose(f, name));
+  o->regular = (PetscBool)(o->regular && !name[0]);
+  if (o->along && !o->regular) {
+    PetscCall(VecNorm(o->U, NORM_INFINITY, &moved));
+    o->idle = o->regular = (PetscBool)(most == 0 && moved == 0 && !f->friction);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCheck(o->regular || most > 0, HycoComm(f), PETSC_ERR_USER, HYCO_TANGENT_UNPRESSED);
+  PetscCheck(!name[0], HycoComm(f), PETSC_ERR_USER, HYCO_GRADIENT_LOOSE, name);
+  PetscCheck(
+      o->regular, HycoComm(f), PETSC_ERR_USER,
+      "the forces of the closed contacts are not unique here, or round-off, and have no derivative; remove contacts "
+      "whose gaps follow from those of others");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Vectors, the data at the solution, and the system of its closed contacts. Collective. Copies of U and L: the model
    moves while differences are taken. */
 static PetscErrorCode Create(Work *o)
 {
   HycoFOM f = o->f;
   HycoDifference d;
-  PetscReal most;
 
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(o->mu, f->fe->mu, f->scene->n_variables));
@@ -390,15 +447,8 @@ static PetscErrorCode Create(Work *o)
   for (PetscInt j = 0; j < 3; j++) PetscCall(VecDuplicate(f->U, &o->R[j]));
   if (f->n_contacts) PetscCall(CreateContacts(o));
   /* Before Data() moves the mesh: the factor and B are those of the solution. */
-  PetscCall(HycoSolverTangentCreate(o->along ? f->path->solver : f->solver, o->U, o->L,
-                                    o->rubs ? HycoFrictionBefore(f->friction) : NULL, &o->tangent, &o->regular));
-  if (!o->regular && o->along) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!o->regular) PetscCall(VecNorm(o->L, NORM_INFINITY, &most));
-  PetscCheck(o->regular || most > 0, HycoComm(f), PETSC_ERR_USER, HYCO_TANGENT_UNPRESSED);
-  PetscCheck(
-      o->regular, HycoComm(f), PETSC_ERR_USER,
-      "the forces of the closed contacts are not unique here, or round-off, and have no derivative; remove contacts "
-      "whose gaps follow from those of others");
+  PetscCall(Determine(o));
+  if (!o->regular) PetscFunctionReturn(PETSC_SUCCESS);
   HycoDifferenceSet(f->scene, o->mu, 0, HYCO_GRADIENT_STEP, &d);
   PetscCall(Data(o, &d, 0, o->W[0]));
   if (!o->store) PetscFunctionReturn(PETSC_SUCCESS);
@@ -471,7 +521,7 @@ PetscErrorCode HycoFOMStateGradient(HycoFOM f, HycoAlong along, const PetscReal 
 
   PetscFunctionBegin;
   ierr = Create(&o);
-  if (!ierr && o.regular) gradient->n_undecided = HycoSolverTangentUndecided(o.tangent);
+  if (!ierr && o.regular && !o.idle) gradient->n_undecided = HycoSolverTangentUndecided(o.tangent);
   for (PetscInt p = 0; !ierr && o.regular && p < gradient->n_parameters; p++) ierr = Column(&o, p, gradient);
   if (!ierr) ierr = Restore(&o);
   *regular = o.regular;
