@@ -405,5 +405,7 @@ PetscInt HycoBodiesGrid(HycoSubstructures bodies, PetscInt k, PetscReal theta[])
 void HycoBodiesMeasure(HycoROM model, HycoKKT *kkt);
 PetscReal HycoBodiesUnbalanced(HycoBodiesWork work);
 PetscErrorCode HycoBodiesLoose(HycoBodiesWork work, PetscInt n, const PetscReal Lambda[], PetscBool *loose);
+/* "body NAME in its place", of the bodies that contact alone holds. */
+void HycoBodiesNameFloating(HycoBodiesWork work, HycoScene scene, char name[HYCO_LINE]);
 
 #endif

@@ -249,8 +249,9 @@ PetscErrorCode HycoFELoads(HycoFE fe, PetscReal f[]);
    of its force; the others are -a_d times it. */
 PetscErrorCode HycoFEReactions(HycoFE fe, const PetscReal u[], const PetscReal f_int[], PetscReal r[]);
 /* K u minus the loads at the free unknowns (r: n_dof, 0 at fixed ones, whose displacements are those prescribed at fe's
-   parameters; complete on the nodes that a part owns). */
-PetscErrorCode HycoFEImbalance(HycoFE fe, const PetscReal u[], PetscReal r[]);
+   parameters; complete on the nodes that a part owns). held: without the cells that have no fixed unknown, whose part
+   depends on the parameters by nodes and stiffnesses alone. */
+PetscErrorCode HycoFEImbalance(HycoFE fe, const PetscReal u[], PetscBool held, PetscReal r[]);
 /* The norm matrix of H1: mass plus length^2 times gradient, fixed unknowns as in K. The length is that of the whole
    mesh (HycoMeshLength()), so that the norm does not depend on the unit; it is 1 in the paper's section 6. */
 PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M);

@@ -10,6 +10,11 @@
 /* Contacts with more than this share of the largest force count as closed where their masters are compared. */
 #define HYCO_GRADIENT_FORCE 1e-7
 
+/* Why there is no derivative where no contact force keeps a body. */
+#define HYCO_GRADIENT_LOOSE                                                                                            \
+  "no contact force keeps %s: its position is arbitrary here, and has no derivative; support it, or take a point at "  \
+  "which contact holds it"
+
 /* Fails for a scene without outputs or parameters. */
 PetscErrorCode HycoGradientCheckScene(HycoScene scene);
 

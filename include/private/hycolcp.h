@@ -72,6 +72,8 @@ typedef struct _n_HycoConeFactor *HycoConeFactor;
 PetscErrorCode HycoConeFactorCreate(HycoConeFactor *factor);
 PetscErrorCode HycoConeFactorDestroy(HycoConeFactor *factor);
 void HycoConeFactorForget(HycoConeFactor factor);
+/* The same blocks as of the last solve, where those are gone. Borrowed. */
+void HycoConeFactorSetBlocks(HycoConeFactor factor, const HycoBlocks *blocks);
 /* After a solve with this factor: the sign of the determinant of J at the solution, as HycoLCP's; dz (p + n, k columns), the derivative of the solution where q changes by dq, on the
    pieces of the laws at the solution. *regular: it has one. */
 PetscErrorCode HycoConeFactorSign(HycoConeFactor factor, PetscInt *sign);
@@ -153,6 +155,17 @@ PetscErrorCode HycoBlocksStay(const HycoBlocks *blocks, PetscInt p, const PetscR
                               PetscReal first[]);
 /* Semismooth Newton's method for blocks of any cone, z = P(z - rho w), w = q + M z, from z = (x_pinned, forces). */
 PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *its, HycoLCPStatus *status);
+/*
+  After a solve with `lcp`'s cone, of which z is the solution, and w = q + M z (p + n): dz and dw where q changes by dq
+  (overwritten) and the coefficients of friction by dmu, by block. before[n]: the forces before the step, which decide where
+  floating bodies without loads are; size: of gaps and displacements of the contacts. *regular false: the solution has no
+  derivative, as where the contacts do not determine it, or change their states.
+*/
+PetscErrorCode HycoConeTangent(const HycoLCP *lcp, const PetscReal before[], const PetscReal z[], const PetscReal w[],
+                               PetscReal size, const PetscReal dmu[], PetscReal dq[], PetscReal dz[], PetscReal dw[],
+                               PetscBool *regular);
+/* y += M x; columns of zero entries are skipped. */
+PetscErrorCode HycoAddDenseProduct(PetscInt n, const PetscReal M[], const PetscReal x[], PetscReal y[]);
 /* Writes a problem with Coulomb's law, its solution z and a start (both p + n) in FCLIB's layout `fclib_local`; dim:
    components of a contact there, 2 or 3. On one process. */
 PetscErrorCode HycoLCPWriteFclib(const HycoLCP *lcp, PetscInt dim, const PetscReal z[], const PetscReal start[],

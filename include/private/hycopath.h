@@ -130,7 +130,11 @@ struct _n_HycoPath {
   PetscErrorCode (*between)(HycoFOM, void *ctx); /* NULL, or called at accepted steps that do not end at a listed
                                                     time */
   void *monitor_ctx;                             /* context of both */
-  PetscErrorCode (*interrupt)(void *ctx);        /* NULL, or called at each iteration; its error ends the path */
+  PetscBool
+      beside; /* of elastic bodies: stresses and reactions are those of the displacements at hand, beside the path */
+  PetscErrorCode (*passes)(HycoPath, PetscReal t0, void *ctx); /* NULL, or called after each accepted step, from t0 */
+  void *passes_ctx;
+  PetscErrorCode (*interrupt)(void *ctx); /* NULL, or called at each iteration; its error ends the path */
   void *interrupt_ctx;
 };
 
@@ -178,12 +182,16 @@ PetscErrorCode HycoFrictionBegin(HycoFOM fom);
 PetscErrorCode HycoFrictionAssemble(HycoFOM fom);
 /* Once a step is accepted, before its work: its forces; bodies stay along motions that no contact force acts on. */
 PetscErrorCode HycoFrictionTake(HycoFOM fom);
+/* Whether a coefficient of 0 at a contact with a force lets a floating body of the accepted step move. */
+PetscErrorCode HycoFrictionMoves(HycoFOM fom, PetscBool *moves);
 /* The work of the bodies against the contact forces in the step that was accepted. */
 PetscErrorCode HycoFrictionWork(HycoFOM fom, PetscReal *work);
 /* The accepted step becomes the state of the contacts. */
 PetscErrorCode HycoFrictionAccept(HycoFOM fom);
 /* The contacts' rows and states at the last accepted time. */
 const HycoSlip *HycoFrictionSlip(HycoFriction friction);
+/* The forces, of all rows, at the accepted time before that. */
+Vec HycoFrictionBefore(HycoFriction friction);
 /* Sets the results of a listed time. */
 PetscErrorCode HycoFrictionMeasure(HycoFOM fom, HycoStep *step);
 /* The state in a checkpoint. `load` after the path is assembled at the checkpoint's time. */
@@ -193,7 +201,7 @@ PetscErrorCode HycoFrictionLoad(HycoFOM fom);
 PetscErrorCode HycoFOMPathCreate(HycoFOM fom);
 /* Fails if an option of paths is given and the scene has no history. */
 PetscErrorCode HycoPathRefuseOptions(HycoFOM fom);
-/* The gradient of the last path, by the paths beside it; the path is then solved again. Collective. */
+/* The gradient of the last path, which is solved again: by its steps, else by the paths beside it. Collective. */
 PetscErrorCode HycoPathGradient(HycoFOM fom, HycoGradient *gradient);
 /* Solves the history at mu; if it does not reach its end, the summary's reason says so. Collective. */
 PetscErrorCode HycoPathSolve(HycoFOM fom, const PetscReal mu[]);

@@ -153,6 +153,7 @@ struct _p_HycoROM {
   HycoFE fe_beyond;             /* on mesh without its cells */
   HycoFE fe_whole;              /* on whole */
   HycoPairs whole_pairs;        /* as `pairs`, on whole */
+  char loose[HYCO_LINE];        /* where prediction.loose is set: "body NAME in its place" */
   HycoFE fe_floating;           /* on the loaded cells of the bodies that contact alone holds */
   HycoOutputCells output_cells; /* of the scene's quantities */
   HycoOutputCells few;          /* those of them that decide the quantities near a prediction; NULL: not needed yet */

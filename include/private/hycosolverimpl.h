@@ -215,13 +215,20 @@ void HycoSolverGetDense(HycoSolver s, HycoLCP *lcp, const PetscReal *z[]);
 /*
   The derivative of the solution x, L of s's system (tangent.c): HycoSolverTangentSolve() gives x' and L' where F - K x -
   Bt L changes by r, and D - B x by g, at fixed x and L; g and dL are not used without contacts. sign, *kink as in
-  HycoTangentSolve(). Needs a factor of K. HycoSolverTangentDestroy() is NULL-safe. Collective.
+  HycoTangentSolve(). Needs a factor of K. *regular false: the closed contacts do not determine the solution, and only
+  HycoSolverTangentDestroy() (NULL-safe) may follow. Of a system with blocks x must be that of the last solve, `before` the
+  forces from which it began (else not read), and HycoSolverTangentSolveCones() takes the derivatives of the coefficients too
+  (mu, like L, at normal rows), and gives dw, of D - B x; step: of the differences by which r was found, whose round-off on
+  motions is none; *regular as in HycoConeTangent(). Collective.
 */
 typedef struct _n_HycoSolverTangent *HycoSolverTangent;
-PetscErrorCode HycoSolverTangentCreate(HycoSolver s, Vec x, Vec L, HycoSolverTangent *tangent);
+PetscErrorCode HycoSolverTangentCreate(HycoSolver s, Vec x, Vec L, Vec before, HycoSolverTangent *tangent,
+                                       PetscBool *regular);
 PetscErrorCode HycoSolverTangentDestroy(HycoSolverTangent *tangent);
 PetscErrorCode HycoSolverTangentSolve(HycoSolverTangent tangent, Vec r, Vec g, int sign, Vec dx, Vec dL,
                                       PetscBool *kink);
+PetscErrorCode HycoSolverTangentSolveCones(HycoSolverTangent tangent, Vec r, Vec g, Vec mu, PetscReal step, Vec dx,
+                                           Vec dL, Vec dw, PetscBool *regular);
 PetscInt HycoSolverTangentUndecided(HycoSolverTangent tangent);
 
 #endif

@@ -912,6 +912,11 @@ PetscErrorCode HycoConeFactorSign(HycoConeFactor f, PetscInt *sign)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void HycoConeFactorSetBlocks(HycoConeFactor f, const HycoBlocks *blocks)
+{
+  HycoConeStepSetBlocks(&f->step, blocks);
+}
+
 /* With the DP of the last solution. */
 PetscErrorCode HycoConeFactorTangent(HycoConeFactor f, PetscInt k, const PetscReal dq[], PetscReal dz[],
                                      PetscBool *regular)

@@ -77,7 +77,5 @@ PetscErrorCode HycoConeStepRenew(HycoConeStep *step);
 void HycoConeStepSetBlocks(HycoConeStep *step, const HycoBlocks *blocks);
 /* The sign of det J; 0: singular. */
 PetscErrorCode HycoConeStepSign(HycoConeStep *step, PetscInt *sign);
-/* y += M x; columns of zero entries are skipped. */
-PetscErrorCode HycoAddDenseProduct(PetscInt n, const PetscReal M[], const PetscReal x[], PetscReal y[]);
 
 #endif

@@ -518,13 +518,13 @@ PetscErrorCode HycoFEReactions(HycoFE fe, const PetscReal u[], const PetscReal f
 }
 
 /* For derivatives at fixed free unknowns: unlike the residual of K U = F it needs no assembled K. Not collective. */
-PetscErrorCode HycoFEImbalance(HycoFE fe, const PetscReal u[], PetscReal r[])
+PetscErrorCode HycoFEImbalance(HycoFE fe, const PetscReal u[], PetscBool held, PetscReal r[])
 {
   PetscFunctionBegin;
   PetscCall(HycoFELoads(fe, r));
   HycoFEGeneralise(fe, r);
   for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = -r[k];
-  PetscCall(AddElastic(fe, u, PETSC_FALSE, r));
+  PetscCall(AddElastic(fe, u, held, r));
   for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = fe->fixed[k] ? 0 : r[k];
   PetscFunctionReturn(PETSC_SUCCESS);
 }

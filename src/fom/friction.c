@@ -284,6 +284,20 @@ static PetscBool Smooth(HycoFOM f)
   return smooth;
 }
 
+PetscErrorCode HycoFrictionMoves(HycoFOM f, PetscBool *moves)
+{
+  PetscInt p;
+  const Vec *v;
+
+  PetscFunctionBegin;
+  *moves = PETSC_FALSE;
+  PetscCall(HycoKernelVectors(f->K, &p, &v));
+  if (!p) PetscFunctionReturn(PETSC_SUCCESS);
+  *moves = Smooth(f);
+  HycoAllreduce(moves, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Where a body may move freely because a coefficient is 0, it stays: with the least slip. The first such motion under a
    force is named. */
 static PetscErrorCode Stay(HycoFOM f)
@@ -293,15 +307,13 @@ static PetscErrorCode Stay(HycoFOM f)
   HycoBlocks *blocks;
   PetscReal *A, *w, *L, *move, *x, *first, most;
   PetscInt p, n, loose;
-  PetscBool smooth;
+  PetscBool moves;
   const Vec *v;
 
   PetscFunctionBegin;
   PetscCall(HycoKernelVectors(f->K, &p, &v));
-  if (!p) PetscFunctionReturn(PETSC_SUCCESS);
-  smooth = Smooth(f);
-  HycoAllreduce(&smooth, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
-  if (!smooth) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFrictionMoves(f, &moves));
+  if (!moves) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoBlocksGather(HycoComm(f), r->system->blocks, &blocks));
   PetscCall(VecGetSize(r->L, &n));
   PetscCall(PetscMalloc6(p * n, &A, n, &w, n, &L, p, &move, p, &x, p, &first));
@@ -427,6 +439,11 @@ PetscErrorCode HycoFrictionAccept(HycoFOM f)
   /* A negative sign of det J at the solution: the step has several solutions (force_uniqueness.c). */
   f->path->now.disproven += r->used && r->solver->sign < 0;
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+Vec HycoFrictionBefore(HycoFriction r)
+{
+  return r->L_before;
 }
 
 const HycoSlip *HycoFrictionSlip(HycoFriction r)

@@ -6,36 +6,53 @@
 
   with the derivatives on the right at fixed U and L: differences of element sums and of rows of contacts. The factor
   is that of the solution. An output's derivative is its difference along U + h U', L + h L' on the mesh at mu + h.
+  A step of a path has the same equations, with the derivatives of the step before in its data (along.h).
 */
-#include <hycofomimpl.h>
-#include <hycogradient.h>
-#include <hycopath.h>
+#include "along.h"
+
+#define CLOSED  1e-7 /* share of the largest gap below which one is closed */
+#define NOTHING 1e-8 /* share of an output's largest value below which it is round-off, as is a change over the range */
 
 typedef struct {
   HycoFOM f;
+  HycoAlong along;       /* NULL at a point; else */
+  const PetscReal *most; /* the largest of each output on the path */
   HycoGradientStore *store;
   PetscReal mu[HYCO_MAX_PARAMETERS];
   HycoSolverTangent tangent;
   Vec U, L, r, g, dU, dL; /* the solution; changes of the data, of the solution */
   Vec R[3], W[5];         /* the data at the three points, and at closer ones */
+  Vec C[3], dC, dW;       /* of friction: the coefficients, their change, that of the slacks */
+  Vec normal;             /* the path's forces without friction */
   PetscReal size;         /* of gaps and displacements of the contacts */
   PetscReal *output;      /* 6 x n_outputs: at the three points, at closer ones */
   PetscBool stress;       /* the caller may hold the stresses */
+  PetscBool rubs;         /* L has the rows of tangents */
+  PetscBool regular;      /* the contacts determine the derivatives; */
+  PetscBool idle;         /* of a path: they do not, but nothing loads or moves the bodies */
+  PetscInt parameter;     /* that is moved, */
+  PetscReal step;         /* by how much, */
+  PetscBool forces, all;  /* whether it changes those of the bodies, of all cells */
 } Work;
 
-/* Subtracts B^T L from the imbalance at this rank's surface nodes, and sets the gaps w = D - B U. */
-static PetscErrorCode AddContacts(HycoFOM f, const PetscReal U[], const PetscReal lambda[], PetscReal force[],
+/* Adds B^T L to the imbalance at this rank's surface nodes, and sets the gaps w = D - B U. */
+static PetscErrorCode AddContacts(const Work *o, const PetscReal U[], const PetscReal lambda[], PetscReal force[],
                                   PetscReal w[])
 {
-  const PetscInt entries = HycoPairsWidth(&f->pairs) * f->fe_surface->dim * f->pairs.n;
+  HycoFOM f = o->f;
+  const PetscInt rows = o->rubs ? HycoFrictionSlip(f->friction)->row[f->pairs.n] : f->pairs.n;
+  const PetscInt entries = HycoPairsWidth(&f->pairs) * f->fe_surface->dim * rows;
   PetscInt *start, *dof;
   PetscReal *value;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc3(f->pairs.n + 1, &start, entries, &dof, entries, &value));
-  ierr = HycoContactRows(f->fe_surface, &f->pairs, start, dof, value, w);
-  for (PetscInt k = 0; !ierr && k < f->pairs.n; k++) {
+  PetscCall(PetscMalloc3(rows + 1, &start, entries, &dof, entries, &value));
+  if (o->rubs)
+    ierr = HycoAlongRows(o->along, o->parameter, o->step, start, dof, value, w);
+  else
+    ierr = HycoContactRows(f->fe_surface, &f->pairs, start, dof, value, w);
+  for (PetscInt k = 0; !ierr && k < rows; k++) {
     for (PetscInt j = start[k]; j < start[k + 1]; j++) {
       /* A sum over the contacts of this rank; several may share a node. */
       force[dof[j]] += value[j] * lambda[k];
@@ -65,7 +82,7 @@ static PetscErrorCode ContactData(Work *o, Vec R, Vec W)
   PetscCall(VecGetArray(at, &force));
   PetscCall(VecGetArray(W, &w));
   PetscCall(VecGetArrayRead(o->L, &lambda));
-  HycoOnEach(HycoComm(f), AddContacts(f, U, lambda, force, w));
+  HycoOnEach(HycoComm(f), AddContacts(o, U, lambda, force, w));
   PetscCall(VecRestoreArrayRead(o->L, &lambda));
   PetscCall(VecRestoreArray(W, &w));
   PetscCall(VecRestoreArray(at, &force));
@@ -78,8 +95,20 @@ static PetscErrorCode ContactData(Work *o, Vec R, Vec W)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* R = K U - F + B^T L, W = D - B U at mu, with the free unknowns of the solution. Collective. */
-static PetscErrorCode Data(Work *o, const PetscReal mu[], Vec R, Vec W)
+/* The coefficients of friction at the present parameters. Collective. */
+static PetscErrorCode Coefficients(Work *o, Vec C)
+{
+  PetscScalar *mu;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArray(C, &mu));
+  HycoOnEach(HycoComm(o->f), HycoAlongCoefficients(o->along, mu));
+  PetscCall(VecRestoreArray(C, &mu));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* R = K U - F, of what the parameter changes. Collective. */
+static PetscErrorCode Forces(Work *o, Vec R)
 {
   HycoFOM f = o->f;
   const PetscInt dim = f->fe->dim;
@@ -87,21 +116,64 @@ static PetscErrorCode Data(Work *o, const PetscReal mu[], Vec R, Vec W)
   PetscScalar *r;
 
   PetscFunctionBegin;
-  /* Moves the mesh and the supports to mu; o->U keeps the free unknowns of the solution. */
-  PetscCall(HycoFOMSetParameters(f, mu));
+  if (!o->forces) {
+    PetscCall(VecSet(R, 0));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(PetscMalloc2(f->fe->n_dof, &u, f->fe->n_dof, &local));
   PetscCall(HycoFOMToLocal(f, o->U, u));
-  HycoOnEach(HycoComm(f), HycoFEImbalance(f->fe, u, local));
+  HycoOnEach(HycoComm(f), o->along && o->all ? HycoAlongImbalance(o->along, u, local)
+                                             : HycoFEImbalance(f->fe, u, (PetscBool)!o->all, local));
   PetscCall(VecGetArray(R, &r));
   for (PetscInt k = 0; k < f->fe->n_dof; k++) {
-    const PetscInt at = HycoMeshOwned(f->part, k / dim);
+    const PetscInt row = HycoMeshOwned(f->part, k / dim);
 
     /* Complete at owned nodes, as the part has all cells around these. */
-    if (at >= 0) r[at * dim + k % dim] = local[k];
+    if (row >= 0) r[row * dim + k % dim] = local[k];
   }
   PetscCall(VecRestoreArray(R, &r));
   PetscCall(PetscFree2(u, local));
-  if (f->n_contacts) PetscCall(ContactData(o, R, W));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* R[j] = K U - F + B^T L, w = D - B U, C[j], at the point j of d, with the free unknowns of the solution. Collective. */
+static PetscErrorCode Data(Work *o, const HycoDifference *d, PetscInt j, Vec w)
+{
+  HycoFOM f = o->f;
+  PetscReal at[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  HycoDifferencePoint(d, f->scene, o->mu, j, at);
+  o->parameter = d->parameter;
+  o->step = d->step[j];
+  /* Moves the mesh and the supports to mu; o->U keeps the free unknowns of the solution. */
+  PetscCall(HycoFOMSetParameters(f, at));
+  PetscCall(Forces(o, o->R[j]));
+  if (f->n_contacts) PetscCall(ContactData(o, o->R[j], w));
+  if (o->dC) PetscCall(Coefficients(o, o->C[j]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The normal forces of L + step dL, as the model's. */
+static PetscErrorCode SetNormal(Work *o, PetscReal step)
+{
+  HycoFOM f = o->f;
+  const HycoSlip *s = o->rubs ? HycoFrictionSlip(f->friction) : NULL;
+  const PetscScalar *L, *dL;
+  PetscScalar *normal;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(o->L, &L));
+  PetscCall(VecGetArrayRead(o->dL, &dL));
+  PetscCall(VecGetArray(f->Lambda, &normal));
+  for (PetscInt k = 0; k < f->pairs.n; k++) {
+    const PetscInt row = s ? s->row[k] : k;
+
+    normal[k] = L[row] + step * dL[row];
+  }
+  PetscCall(VecRestoreArray(f->Lambda, &normal));
+  PetscCall(VecRestoreArrayRead(o->dL, &dL));
+  PetscCall(VecRestoreArrayRead(o->L, &L));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -124,10 +196,11 @@ static PetscErrorCode Measure(void *context, const PetscReal mu[], PetscReal ste
     if (at >= 0 && f->fe->fixed[k]) u[at * dim + k % dim] = f->fe->u0[k];
   }
   PetscCall(VecRestoreArray(f->U, &u));
-  if (f->n_contacts) PetscCall(VecWAXPY(f->Lambda, step, o->dL, o->L));
+  if (f->n_contacts) PetscCall(SetNormal(o, step));
   /* Stresses are computed anew where an output needs them. */
   f->sigma_ready = PETSC_FALSE;
   PetscCall(HycoFOMGather(f));
+  if (o->along) PetscCall(HycoAlongShow(o->along, o->parameter, step, o->L, o->dL));
   PetscCall(HycoFOMMeasureQuantities(f, output));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -136,21 +209,22 @@ static PetscErrorCode Measure(void *context, const PetscReal mu[], PetscReal ste
    nearer to mu are known too; otherwise *turns may be curvature. Collective. */
 static PetscErrorCode Turns(Work *o, const HycoDifference *d, PetscBool closer, PetscBool *turns)
 {
-  HycoFOM f = o->f;
   const PetscScalar *w[5], *L;
   PetscReal most, slope = 0;
+  PetscInt rows;
 
   PetscFunctionBegin;
   *turns = PETSC_FALSE;
   PetscCall(VecMax(o->L, NULL, &most));
+  PetscCall(VecGetLocalSize(o->L, &rows));
   PetscCall(VecGetArrayRead(o->L, &L));
   for (PetscInt j = 0; j < 5; j++) PetscCall(VecGetArrayRead(o->W[j], &w[j]));
-  for (PetscInt k = 0; k < f->pairs.n; k++) {
+  for (PetscInt k = 0; k < rows; k++) {
     /* The largest rate of all gaps is the scale of a jump: a gap that does not change has only round-off. */
     if (L[k] > HYCO_GRADIENT_FORCE * most) slope = PetscMax(slope, PetscAbsReal((w[1][k] - w[0][k]) / d->step[1]));
   }
-  HycoAllreduce(&slope, 1, MPIU_REAL, MPI_MAX, HycoComm(f));
-  for (PetscInt k = 0; k < f->pairs.n; k++) {
+  HycoAllreduce(&slope, 1, MPIU_REAL, MPI_MAX, HycoComm(o->f));
+  for (PetscInt k = 0; k < rows; k++) {
     const PetscReal v[3] = {w[0][k], w[1][k], w[2][k]}, near[3] = {w[0][k], w[3][k], w[4][k]};
     PetscReal jump;
 
@@ -160,7 +234,7 @@ static PetscErrorCode Turns(Work *o, const HycoDifference *d, PetscBool closer, 
   }
   for (PetscInt j = 0; j < 5; j++) PetscCall(VecRestoreArrayRead(o->W[j], &w[j]));
   PetscCall(VecRestoreArrayRead(o->L, &L));
-  HycoAllreduce(turns, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
+  HycoAllreduce(turns, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(o->f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -168,8 +242,6 @@ static PetscErrorCode Turns(Work *o, const HycoDifference *d, PetscBool closer, 
    a change of masters farther away. Collective. */
 static PetscErrorCode FindTurns(Work *o, HycoDifference *d, PetscBool *turns)
 {
-  PetscReal at[HYCO_MAX_PARAMETERS];
-
   PetscFunctionBegin;
   for (PetscInt k = 0; k < HYCO_GRADIENT_CLOSER; k++) {
     HycoDifference near = *d;
@@ -178,10 +250,7 @@ static PetscErrorCode FindTurns(Work *o, HycoDifference *d, PetscBool *turns)
     if (!*turns) break;
     /* The size of a jump between slopes stays when the points come closer; that of curvature shrinks with them. */
     HycoDifferenceShrink(&near);
-    for (PetscInt j = 1; j < 3; j++) {
-      HycoDifferencePoint(&near, o->f->scene, o->mu, j, at);
-      PetscCall(Data(o, at, o->R[j], o->W[2 + j]));
-    }
+    for (PetscInt j = 1; j < 3; j++) PetscCall(Data(o, &near, j, o->W[2 + j]));
     PetscCall(Turns(o, d, PETSC_TRUE, turns));
     for (PetscInt j = 1; j < 3; j++) {
       Vec W = o->W[j];
@@ -198,39 +267,166 @@ static PetscErrorCode FindTurns(Work *o, HycoDifference *d, PetscBool *turns)
 static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *turns)
 {
   HycoFOM f = o->f;
-  PetscReal at[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
   *turns = PETSC_FALSE;
-  for (PetscInt j = 1; j < 3; j++) {
-    HycoDifferencePoint(d, f->scene, o->mu, j, at);
-    PetscCall(Data(o, at, o->R[j], o->W[j]));
-  }
+  for (PetscInt j = 1; j < 3; j++) PetscCall(Data(o, d, j, o->W[j]));
   if (f->n_contacts) PetscCall(FindTurns(o, d, turns));
   /* A difference across a change of masters would mix two slopes. */
   if (*turns) HycoDifferenceTakeSide(d);
+  if (d->weight[0] != 0)
+    PetscCall(Data(o, d, 0, o->W[0]));
+  else
+    PetscCall(VecSet(o->R[0], 0));
   PetscCall(VecSet(o->r, 0));
   /* Minus: R = K U - F + B^T L, and r is the change of its negative. */
   for (PetscInt j = 0; j < 3; j++) PetscCall(VecAXPY(o->r, -d->weight[j], o->R[j]));
   if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecSet(o->g, 0));
   for (PetscInt j = 0; j < 3; j++) PetscCall(VecAXPY(o->g, d->weight[j], o->W[j]));
+  if (!o->dC) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecSet(o->dC, 0));
+  for (PetscInt j = 0; j < 3; j++) PetscCall(VecAXPY(o->dC, d->weight[j], o->C[j]));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Bodies at rest that contact alone holds: a change of the loads, or of a gap that is closed, has no derivative. Collective. */
+static PetscErrorCode Rest(Work *o)
+{
+  const PetscScalar *w, *g;
+  PetscReal most, load;
+  PetscInt rows;
+
+  PetscFunctionBegin;
+  PetscCall(VecNorm(o->r, NORM_INFINITY, &load));
+  PetscCall(VecNorm(o->g, NORM_INFINITY, &most));
+  PetscCall(VecGetLocalSize(o->L, &rows));
+  PetscCall(VecGetArrayRead(o->W[0], &w));
+  PetscCall(VecGetArrayRead(o->g, &g));
+  o->regular = (PetscBool)(load == 0);
+  for (PetscInt k = 0; k < rows; k++)
+    o->regular = (PetscBool)(o->regular && (w[k] > CLOSED * o->size || PetscAbsReal(g[k]) <= NOTHING * most));
+  PetscCall(VecRestoreArrayRead(o->g, &g));
+  PetscCall(VecRestoreArrayRead(o->W[0], &w));
+  HycoAllreduce(&o->regular, 1, HYCO_MPI_BOOL, MPI_LAND, HycoComm(o->f));
+  PetscCall(VecSet(o->dU, 0));
+  PetscCall(VecSet(o->dL, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The solution's change. *kink: an undecided contact takes another state towards the two sides. With friction, which
+   remembers where it was, such steps have no derivative. Collective. */
+static PetscErrorCode Solve(Work *o, const HycoDifference *d, PetscBool *kink)
+{
+  PetscReal most = 0;
+
+  PetscFunctionBegin;
+  *kink = PETSC_FALSE;
+  if (o->rubs) {
+    PetscCall(HycoSolverTangentSolveCones(o->tangent, o->r, o->g, o->dC, d->step[1], o->dU, o->dL, o->dW, &o->regular));
+    if (o->regular) PetscCall(HycoAlongSpend(o->along, d->parameter, o->L, o->W[0], o->dL, o->dW));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (o->idle) {
+    PetscCall(Rest(o));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(HycoSolverTangentSolve(o->tangent, o->r, o->g, d->sign, o->dU, o->dL, kink));
+  if (!o->dC) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecNorm(o->dC, NORM_INFINITY, &most));
+  o->regular = (PetscBool)(!*kink && most == 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Outputs that are round-off at a time of a path, as stresses of bodies without loads, have no derivative, and no kink. */
+static void DropRounding(Work *o, PetscInt p, const HycoGradient *g)
+{
+  const HycoScene s = o->f->scene;
+  const PetscReal width = s->hi[p] > s->lo[p] ? s->hi[p] - s->lo[p] : 1;
+
+  for (PetscInt q = 0; q < g->n_outputs; q++) {
+    const PetscInt at = q * g->n_parameters + p;
+    const PetscReal least = NOTHING * o->most[q];
+
+    if (PetscAbsReal(o->output[q]) > least || PetscAbsReal(o->store->value[at]) * width > least) continue;
+    o->store->value[at] = 0;
+    o->store->kink[at] = PETSC_FALSE;
+  }
 }
 
 /* One column of the gradient. Collective. */
 static PetscErrorCode Column(Work *o, PetscInt p, HycoGradient *gradient)
 {
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, turns, kink;
   HycoDifference d;
-  PetscBool turns, kink;
+  HycoChanges c;
 
   PetscFunctionBegin;
+  changed[p] = PETSC_TRUE;
+  c = HycoSceneChanges(o->f->scene, changed);
+  o->all = (PetscBool)(c.nodes || c.stiffness);
+  o->forces = HycoSceneForcesChange(o->f->scene, changed);
   HycoDifferenceSet(o->f->scene, o->mu, p, HYCO_GRADIENT_STEP, &d);
   PetscCall(Differentiate(o, &d, &turns));
-  /* kink: an undecided contact takes another state towards the two sides. */
-  PetscCall(HycoSolverTangentSolve(o->tangent, o->r, o->g, d.sign, o->dU, o->dL, &kink));
-  PetscCall(HycoGradientColumn(gradient, o->store, o->f->scene, o->mu, &d, (PetscBool)(turns || kink), Measure, o,
-                               o->output));
+  if (turns && o->dC) o->regular = PETSC_FALSE;
+  if (o->regular) PetscCall(Solve(o, &d, &kink));
+  if (!o->regular) PetscFunctionReturn(PETSC_SUCCESS);
+  if (o->store)
+    PetscCall(HycoGradientColumn(gradient, o->store, o->f->scene, o->mu, &d, (PetscBool)(turns || kink), Measure, o,
+                                 o->output));
+  if (o->store && o->most && !turns && !kink) DropRounding(o, p, gradient);
+  if (o->along) PetscCall(HycoAlongTake(o->along, o->mu, &d, o->U, o->dU));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Vectors like the forces, and the size of gaps. Collective. */
+static PetscErrorCode CreateContacts(Work *o)
+{
+  HycoFOM f = o->f;
+  const Vec L = o->along ? f->path->Lambda : f->Lambda, D = o->along ? f->path->D : f->D;
+  PetscReal bu = 0, d = 0;
+
+  PetscFunctionBegin;
+  HycoVecDuplicate(L, &o->L, &o->g, &o->dL);
+  PetscCall(VecCopy(L, o->L));
+  for (PetscInt j = 0; j < 5; j++) PetscCall(VecDuplicate(L, &o->W[j]));
+  PetscCall(VecNorm(D, NORM_INFINITY, &d));
+  PetscCall(MatMult(o->along ? f->path->B : f->B, f->U, o->g));
+  PetscCall(VecNorm(o->g, NORM_INFINITY, &bu));
+  o->size = PetscMax(d, bu);
+  if (!o->along || !f->friction) PetscFunctionReturn(PETSC_SUCCESS);
+  o->rubs = HycoAlongRubs(o->along);
+  HycoVecDuplicate(L, &o->C[0], &o->C[1], &o->C[2], &o->dC, &o->dW);
+  PetscCall(VecDuplicate(f->Lambda, &o->normal));
+  PetscCall(VecCopy(f->Lambda, o->normal));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The system of the closed contacts. Where forces hold a body only by round-off the matrix may be regular. Collective. */
+static PetscErrorCode Determine(Work *o)
+{
+  HycoFOM f = o->f;
+  char name[HYCO_LINE] = "";
+  PetscReal most = 0, moved;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSolverTangentCreate(o->along ? f->path->solver : f->solver, o->U, o->L,
+                                    o->rubs ? HycoFrictionBefore(f->friction) : NULL, &o->tangent, &o->regular));
+  if (!f->n_contacts || o->rubs) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecNorm(o->L, NORM_INFINITY, &most));
+  if (most > 0 && (!o->regular || !HycoSolverTangentUndecided(o->tangent))) PetscCall(HycoFOMNameLoose(f, name));
+  o->regular = (PetscBool)(o->regular && !name[0]);
+  if (o->along && !o->regular) {
+    PetscCall(VecNorm(o->U, NORM_INFINITY, &moved));
+    o->idle = o->regular = (PetscBool)(most == 0 && moved == 0 && !f->friction);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCheck(o->regular || most > 0, HycoComm(f), PETSC_ERR_USER, HYCO_TANGENT_UNPRESSED);
+  PetscCheck(!name[0], HycoComm(f), PETSC_ERR_USER, HYCO_GRADIENT_LOOSE, name);
+  PetscCheck(
+      o->regular, HycoComm(f), PETSC_ERR_USER,
+      "the forces of the closed contacts are not unique here, or round-off, and have no derivative; remove contacts "
+      "whose gaps follow from those of others");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -239,7 +435,7 @@ static PetscErrorCode Column(Work *o, PetscInt p, HycoGradient *gradient)
 static PetscErrorCode Create(Work *o)
 {
   HycoFOM f = o->f;
-  PetscReal bu = 0, d = 0;
+  HycoDifference d;
 
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(o->mu, f->fe->mu, f->scene->n_variables));
@@ -249,19 +445,16 @@ static PetscErrorCode Create(Work *o)
   PetscCall(VecCopy(f->U, o->U));
   HycoVecDuplicate(f->U, &o->r, &o->dU);
   for (PetscInt j = 0; j < 3; j++) PetscCall(VecDuplicate(f->U, &o->R[j]));
-  if (f->n_contacts) {
-    PetscCall(VecDuplicate(f->Lambda, &o->L));
-    PetscCall(VecCopy(f->Lambda, o->L));
-    HycoVecDuplicate(f->Lambda, &o->g, &o->dL);
-    for (PetscInt j = 0; j < 5; j++) PetscCall(VecDuplicate(f->Lambda, &o->W[j]));
-    PetscCall(VecNorm(f->D, NORM_INFINITY, &d));
-    PetscCall(MatMult(f->B, f->U, o->g));
-    PetscCall(VecNorm(o->g, NORM_INFINITY, &bu));
-    o->size = PetscMax(d, bu);
-  }
+  if (f->n_contacts) PetscCall(CreateContacts(o));
   /* Before Data() moves the mesh: the factor and B are those of the solution. */
-  PetscCall(HycoSolverTangentCreate(f->solver, o->U, o->L, &o->tangent));
-  PetscCall(Data(o, o->mu, o->R[0], o->W[0]));
+  PetscCall(Determine(o));
+  if (!o->regular) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoDifferenceSet(f->scene, o->mu, 0, HYCO_GRADIENT_STEP, &d);
+  PetscCall(Data(o, &d, 0, o->W[0]));
+  if (!o->store) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Of this path, and not of one with other round-off: all three points are. */
+  if (o->along) f->sigma_ready = PETSC_FALSE;
+  if (o->along) PetscCall(HycoFOMGather(f));
   PetscCall(HycoFOMMeasureQuantities(f, o->output));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -276,8 +469,12 @@ static PetscErrorCode Restore(Work *o)
   PetscFunctionBegin;
   PetscCall(HycoFOMSetParameters(f, o->mu));
   PetscCall(VecCopy(o->U, f->U));
-  if (f->n_contacts) PetscCall(VecCopy(o->L, f->Lambda));
+  if (f->n_contacts) PetscCall(VecCopy(o->normal ? o->normal : o->L, f->Lambda));
   f->sigma_ready = PETSC_FALSE;
+  if (o->along) {
+    PetscCall(HycoAlongEnd(o->along));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(HycoFOMGather(f));
   if (o->stress) PetscCall(HycoFOMStress(f));
   /* The caller may hold the array, which must have the solution's values again. */
@@ -293,7 +490,8 @@ static PetscErrorCode Destroy(Work *o)
   PetscCall(PetscFree(o->output));
   for (PetscInt j = 0; j < 3; j++) PetscCall(VecDestroy(&o->R[j]));
   for (PetscInt j = 0; j < 5; j++) PetscCall(VecDestroy(&o->W[j]));
-  HycoDestroyAll(&o->U, &o->L, &o->r, &o->g, &o->dU, &o->dL);
+  for (PetscInt j = 0; j < 3; j++) PetscCall(VecDestroy(&o->C[j]));
+  HycoDestroyAll(&o->U, &o->L, &o->r, &o->g, &o->dU, &o->dL, &o->dC, &o->dW, &o->normal);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -315,11 +513,27 @@ static PetscErrorCode Check(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoFOMStateGradient(HycoFOM f, HycoAlong along, const PetscReal most[], HycoGradientStore *store,
+                                    HycoGradient *gradient, PetscBool *regular)
+{
+  Work o = {.f = f, .along = along, .most = most, .store = store};
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  ierr = Create(&o);
+  if (!ierr && o.regular && !o.idle) gradient->n_undecided = HycoSolverTangentUndecided(o.tangent);
+  for (PetscInt p = 0; !ierr && o.regular && p < gradient->n_parameters; p++) ierr = Column(&o, p, gradient);
+  if (!ierr) ierr = Restore(&o);
+  *regular = o.regular;
+  PetscCall(Destroy(&o));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A linear solve for each parameter with the factor that is there; no contact problem is solved again. */
 PetscErrorCode HycoFOMGetGradient(HycoFOM f, HycoGradient *gradient)
 {
-  Work o = {.f = f};
-  PetscErrorCode ierr;
+  PetscBool regular;
 
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
@@ -328,15 +542,8 @@ PetscErrorCode HycoFOMGetGradient(HycoFOM f, HycoGradient *gradient)
     PetscCall(HycoPathGradient(f, gradient));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  o.store = &f->gradient;
-  PetscCall(HycoGradientCreate(f->scene, o.store, gradient));
-  ierr = Create(&o);
-  if (!ierr) gradient->n_undecided = HycoSolverTangentUndecided(o.tangent);
-  for (PetscInt p = 0; !ierr && p < gradient->n_parameters; p++) ierr = Column(&o, p, gradient);
-  if (!ierr) ierr = Restore(&o);
+  PetscCall(HycoGradientCreate(f->scene, &f->gradient, gradient));
   /* The model may stand at mu + h: its solution is not to be used. */
-  if (ierr) f->solved = PETSC_FALSE;
-  PetscCall(Destroy(&o));
-  PetscCall(ierr);
+  HycoOnError(HycoFOMStateGradient(f, NULL, NULL, &f->gradient, gradient, &regular), f->solved = PETSC_FALSE);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

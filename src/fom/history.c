@@ -168,6 +168,7 @@ static void NoteRate(HycoPath p, PetscReal h, PetscReal increment)
    the next end. */
 static PetscErrorCode Accept(HycoPath p, PetscReal t1, const HycoStepAttempt *a)
 {
+  const PetscReal t0 = p->t;
   HycoFEState state = p->begin;
 
   PetscFunctionBegin;
@@ -185,6 +186,7 @@ static PetscErrorCode Accept(HycoPath p, PetscReal t1, const HycoStepAttempt *a)
   p->taken[p->n_taken++] = p->t;
   /* Last: the op may read the accepted time and state. */
   PetscCall((*p->ops->accept)(p, a));
+  if (p->passes) PetscCall((*p->passes)(p, t0, p->passes_ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

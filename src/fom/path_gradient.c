@@ -1,6 +1,5 @@
-/* The gradient of a path at full order, by the paths beside it in its own steps. */
-#include <hycogradient.h>
-#include <hycopath.h>
+/* The gradient of a path at full order: step by step, else by the paths beside it in its own steps. */
+#include "along.h"
 
 typedef struct {
   HycoFOM f;
@@ -64,22 +63,105 @@ static PetscErrorCode Follow(void *context, const PetscReal mu[], const HycoStep
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The path is solved again at the end: the caller may ask for any of its results. */
-PetscErrorCode HycoPathGradient(HycoFOM f, HycoGradient *gradient)
+/* The path that is solved again for its derivatives. */
+typedef struct {
+  HycoFOM f;
+  HycoAlong along;
+  const HycoGradient *gradient;
+  const PetscReal *most; /* the largest of each output on the path */
+  PetscBool done;        /* no step so far lacks them */
+} Again;
+
+/* After an accepted step. Without friction the steps do not depend on each other, and those between the listed times are
+   left out. */
+static PetscErrorCode Pass(HycoPath p, PetscReal t0, void *context)
+{
+  Again *o = (Again *)context;
+  HycoFOM f = o->f;
+  const PetscInt n = o->gradient->n_outputs, np = o->gradient->n_parameters;
+  const PetscBool lists = (PetscBool)(p->t == p->scene->times[p->step]);
+  HycoGradientStore there = {f->gradient.value + p->step * n * np, f->gradient.kink + p->step * n * np};
+  HycoGradient at = {.n_outputs = n, .n_parameters = np};
+
+  PetscFunctionBegin;
+  if (!o->done || (!lists && !f->friction)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoAlongStep(o->along, t0, &o->done));
+  if (o->done) PetscCall(HycoFOMStateGradient(f, o->along, o->most, lists ? &there : NULL, &at, &o->done));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All facets of masters that the points beside the path need: along the path the surfaces stay. Collective. */
+static PetscErrorCode Fetch(HycoFOM f, const PetscReal mu[])
+{
+  PetscReal at[HYCO_MAX_PARAMETERS];
+  HycoDifference d;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < f->scene->n_parameters && f->size > 1 && f->searches; p++) {
+    HycoDifferenceSet(f->scene, mu, p, HYCO_GRADIENT_STEP, &d);
+    for (PetscInt j = 1; j < 3; j++) {
+      HycoDifferencePoint(&d, f->scene, mu, j, at);
+      PetscCall(HycoFOMSetParameters(f, at));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The path again, with the gradient of its steps; *done false: one has none. Collective. */
+static PetscErrorCode BySteps(HycoFOM f, const PetscReal mu[], HycoGradient *gradient, PetscBool *done)
+{
+  HycoPath p = f->path;
+  const PetscInt n = f->scene->n_quantities;
+  Again o = {.f = f, .gradient = gradient, .done = PETSC_TRUE};
+  PetscReal *most;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoGradientCreate(f->scene, &f->gradient, gradient));
+  PetscCall(PetscCalloc1(n + 1, &most));
+  for (PetscInt k = 0; k < n * p->n_steps; k++)
+    most[k % n] = PetscMax(most[k % n], PetscAbsReal(p->steps[k / n].quantity[k % n]));
+  o.most = most;
+  ierr = Fetch(f, mu);
+  if (!ierr) ierr = HycoAlongCreate(f, &o.along);
+  p->passes = Pass;
+  p->passes_ctx = &o;
+  if (!ierr) ierr = Solve(f, mu);
+  p->passes = NULL;
+  *done = (PetscBool)(!ierr && o.done);
+  PetscCall(HycoAlongDestroy(&o.along));
+  PetscCall(PetscFree(most));
+  PetscCall(ierr);
+  if (*done) HycoGradientOfExtremes(f->scene, mu, p->steps, &f->gradient, gradient);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same by the paths beside it. The path is solved again at the end: the caller may ask for any of its results. */
+static PetscErrorCode Beside(HycoFOM f, const PetscReal mu[], HycoGradient *gradient)
 {
   HycoPath p = f->path;
   Work o = {.f = f, .n = p->n_taken};
-  PetscReal mu[HYCO_MAX_PARAMETERS];
   PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  HycoDuplicate(p->n_taken, p->taken, &o.taken);
+  ierr = HycoGradientOfPath(f->scene, mu, p->steps, &f->gradient, gradient, Follow, &o);
+  if (!ierr) ierr = Solve(f, mu);
+  PetscCall(PetscFree(o.taken));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPathGradient(HycoFOM f, HycoGradient *gradient)
+{
+  HycoPath p = f->path;
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+  PetscBool done = PETSC_FALSE;
 
   PetscFunctionBegin;
   HycoCheck(p->ended, "there is no gradient: the path ends at t = %g, before its last time", (double)p->t);
   PetscCall(PetscArraycpy(mu, f->fe->mu, f->scene->n_variables));
-  HycoDuplicate(p->n_taken, p->taken, &o.taken);
-  ierr = HycoGradientOfPath(f->scene, mu, p->steps, &f->gradient, gradient, Follow, &o);
-  if (!ierr) ierr = Solve(f, mu);
-  if (ierr) f->solved = PETSC_FALSE;
-  PetscCall(PetscFree(o.taken));
-  PetscCall(ierr);
+  if (!p->flows && !p->solver->iterative) HycoOnError(BySteps(f, mu, gradient, &done), f->solved = PETSC_FALSE);
+  if (!done) HycoOnError(Beside(f, mu, gradient), f->solved = PETSC_FALSE);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -45,7 +45,7 @@ static PetscErrorCode Reactions(HycoFOM f, PetscReal contact[], PetscReal r[])
   PetscReal *f_int = NULL, *along;
 
   PetscFunctionBegin;
-  if (f->path) {
+  if (f->path && !f->path->beside) {
     PetscCall(PetscMalloc1(f->fe->n_dof, &f_int));
     PetscCall(HycoFOMToLocal(f, f->path->f_old, f_int));
   }

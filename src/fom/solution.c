@@ -241,7 +241,7 @@ PetscErrorCode HycoFOMStress(HycoFOM f)
   if (!f->sigma) PetscCall(PetscMalloc1(f->part->n_cells * f->fe->n_sigma, &f->sigma));
   PetscCall(VecGetArrayRead(f->U_local, &u));
   /* Stresses of a path are those of the laws' state. */
-  if (f->path)
+  if (f->path && !f->path->beside)
     PetscCall(HycoFEStateFields(f->fe, f->path->begin, f->sigma, NULL, NULL, NULL));
   else
     PetscCall(HycoFEStress(f->fe, u, f->sigma));

@@ -238,6 +238,21 @@ output: {fx: {force: x, contact: side}, fy: {force: y, contact: floor}}
                 report = json.load(file)
             self.assertEqual((report['position_arbitrary'], report['estimated_error_u'] is None, 'position is arbitrary' in run.stdout), 3 * (px == 0,))
 
+    def test_place(self):
+        """Where contact forces are unique, but a body's place is not, it has no derivative: at full order and in a model the line names the body."""
+        grid, axis = Grid(), np.linspace(0, 1, 3)
+        wedge = lambda x: np.c_[(x[:, 0] - 0.5) * (1 + 0.5 * x[:, 1]), x[:, 1]]  # whose upper corners touch a groove: it may turn about the point that both push to
+        grid.box('quad4', [axis, axis], wedge, 'block', {'x0': 'left', 'x1': 'right', 'y1': 'top'})
+        self.written('scene: {mesh: mesh.msh, parameters: [px, py]}\nparameter: {px: {range: [0, 3]}, py: {range: [5, 20]}}\nbody: {block: {young: 1e5}}\n'
+                     'traction: {top: {x: px, y: -py}}\ncontact: {l: {type: obstacle, group: left, normal: {x: -1, y: -0.5}, gap: 0.05*(1 - y)}, '
+                     'r: {type: obstacle, group: right, normal: {x: 1, y: -0.5}, gap: 0.05*(1 - y)}}\noutput: {fx: {force: x, contact: l}}\n', grid)
+        self.hyco('train', '-scene', 'scene.yaml', '-scatter', 4, '-model', self.path('m.h5'), '-hyco_model_type', 'bodies', status=None)
+        for command in (('solve', '-scene', 'scene.yaml'), ('predict', '-model', 'm.h5')):
+            self.assertEqual(self.run_raw(*command, '-mu', '2,9', '-gradient').returncode, 0)
+            run = self.run_raw(*command, '-mu', '0,9', '-gradient')
+            self.assertEqual(run.returncode, 1)
+            self.assertRegex(run.stderr, '^hyco: error: no contact force keeps body block .*: its position is arbitrary here, and has no derivative')
+
     def test_travels(self):
         """A block that contact alone holds at places far apart: as a set each is the single solution, and `check` accepts the range."""
         grid, axis = Grid(), np.linspace(0, 1, 5)

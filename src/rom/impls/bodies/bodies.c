@@ -147,6 +147,7 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
   /* The bound of theory.md: from the samples' error e and the present forces; 0 where nothing is interpolated. */
   p->interpolation_error = HycoBodiesBound(o, &norm);
   PetscCall(HycoBodiesLoose(o, m->model->pairs.n, m->Lambda, &p->loose));
+  if (p->loose) HycoBodiesNameFloating(o, m->model->scene, m->loose);
   p->iterations = o->its;
   p->reason = solved && HycoKKTMax(&p->kkt) > m->solver->rtol ? HYCO_DIVERGED_RESIDUAL : o->reason;
   /* As at full order: a method that ends without an answer of its own may have found it, but not beside the surfaces. */

@@ -1124,6 +1124,24 @@ PetscErrorCode HycoBodiesLoose(HycoBodiesWork o, PetscInt n, const PetscReal Lam
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Which of several it is, is not asked: of bodies that hold each other none has a place. */
+void HycoBodiesNameFloating(HycoBodiesWork o, HycoScene scene, char name[HYCO_LINE])
+{
+  const HycoSubstructures b = o->bodies;
+  char list[HYCO_LINE] = "", before[HYCO_LINE];
+  PetscInt n = 0;
+
+  for (PetscInt k = 0; k < b->n; k++) {
+    PetscBool moves = PETSC_FALSE;
+
+    for (PetscInt i = b->start[k] * b->p; i < b->start[k + 1] * b->p; i++) moves = (PetscBool)(moves || o->Z[i] != 0);
+    if (!moves) continue;
+    HycoFormat(before, "%s", list);
+    HycoFormat(list, "%s%s%s", before, n++ ? ", " : "", scene->body[k].name);
+  }
+  HycoFormat(name, "%s%s in its place", n > 1 ? "one of the bodies " : "body ", list);
+}
+
 /* |L~|_W^2 = sum of f.(C f / kappa), from the displacements by the forces. `gram` holds the errors of R in the
    norm of C^-1: that is the term |B (R~ - R) c|_{W^-1} of the bound, kappa scaling C and R alike. */
 PetscReal HycoBodiesBound(HycoBodiesWork o, PetscReal *norm)

@@ -424,6 +424,6 @@ void HycoSolverGetDense(HycoSolver s, HycoLCP *lcp, const PetscReal *z[])
 {
   const Dual *d = (const Dual *)HycoSolverFindForm(s, "dual")->data;
 
-  *lcp = (HycoLCP){.n = d->m, .p = d->p, .M = d->S, .q = d->g, .symmetric = s->system->symmetric};
+  *lcp = (HycoLCP){.n = d->m, .p = d->p, .M = d->S, .q = d->g, .symmetric = s->system->symmetric, .cone = d->cone};
   *z = d->L;
 }

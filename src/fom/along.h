@@ -1,0 +1,41 @@
+/* The gradient of a state at full order, and what a path carries of it from one step to the next. */
+#ifndef ALONG_H
+#define ALONG_H
+
+#include <hycogradient.h>
+#include <hycopath.h>
+
+/* The derivatives by the parameters of what the steps of a path hand on: with friction the places of the surfaces, from
+   which the next step's slips count, and the work so far. */
+typedef struct _n_HycoAlong *HycoAlong;
+PetscErrorCode HycoAlongCreate(HycoFOM fom, HycoAlong *along);
+/* NULL-safe. */
+PetscErrorCode HycoAlongDestroy(HycoAlong *along);
+/* The step from t0 to the path's accepted state; *able false: it has no derivatives by the system of its contacts. Collective,
+   as all functions below but those that are named. */
+PetscErrorCode HycoAlongStep(HycoAlong along, PetscReal t0, PetscBool *able);
+/* Whether the step's contacts slide with friction: L, and all vectors like it, then have a row for each tangent. */
+PetscBool HycoAlongRubs(HycoAlong along);
+/* As HycoFEImbalance(), of all cells; u is overwritten where it is fixed. Not collective. */
+PetscErrorCode HycoAlongImbalance(HycoAlong along, PetscReal u[], PetscReal r[]);
+/* The rows with tangents at the parameters of fe_surface, `step` along a parameter. Not collective. */
+PetscErrorCode HycoAlongRows(HycoAlong along, PetscInt parameter, PetscReal step, PetscInt start[], PetscInt dof[],
+                             PetscReal value[], PetscReal gap[]);
+/* The coefficients there at the contacts' first rows, 0 at others. Not collective. */
+PetscErrorCode HycoAlongCoefficients(HycoAlong along, PetscReal mu[]);
+/* Adds what the step changes in the derivatives of the work: L and w = D - B U with their derivatives. */
+PetscErrorCode HycoAlongSpend(HycoAlong along, PetscInt parameter, Vec L, Vec w, Vec dL, Vec dw);
+/* Takes the places at the end of the step, for displacements U + step dU at the parameter's points. */
+PetscErrorCode HycoAlongTake(HycoAlong along, const PetscReal mu[], const HycoDifference *difference, Vec U, Vec dU);
+/* Shows outputs the friction of L + step dL (all rows) at fe's parameters; stresses and reactions are those of f->U. */
+PetscErrorCode HycoAlongShow(HycoAlong along, PetscInt parameter, PetscReal step, Vec L, Vec dL);
+/* Ends the step, with the path at its own state again: what was shown is taken back, and what was taken is handed on. */
+PetscErrorCode HycoAlongEnd(HycoAlong along);
+
+/* The gradient of the present state at f's parameters, in `store` (NULL: its outputs are not wanted); along: of a step that
+   HycoAlongStep() has begun, with the largest of each output on the path (n_quantities); else NULL. *regular false: it has none by the system
+   of its contacts; not at a point, where that is an error. */
+PetscErrorCode HycoFOMStateGradient(HycoFOM fom, HycoAlong along, const PetscReal most[], HycoGradientStore *store,
+                                    HycoGradient *gradient, PetscBool *regular);
+
+#endif
