@@ -15,9 +15,10 @@ typedef struct {
      rest, leave it */
   PetscReal rate, apart;
 } HycoMaterialSlope;
-/* After HycoMaterialUpdate() of these points: along n directions. */
-typedef PetscErrorCode (*HycoMaterialSlopes)(HycoMaterial material, const HycoMaterialPoints *points, PetscInt n,
-                                             HycoMaterialSlope slope[]);
+/* After HycoMaterialUpdate() of these points, whose solved equations are kept in `solved` (solved_size bytes each), and
+   are there unless `fresh`. */
+typedef PetscErrorCode (*HycoMaterialSlopes)(HycoMaterial material, const HycoMaterialPoints *points, PetscBool fresh,
+                                             void *solved, HycoMaterialSlope *slope);
 
 struct _p_HycoMaterial {
   PETSCHEADER(struct _HycoMaterialOps);
@@ -31,6 +32,7 @@ struct _p_HycoMaterial {
   HycoExpr temperature;        /* owned by the body; NULL: it has none */
   void *data;
   HycoMaterialSlopes slopes; /* NULL: the law has no derivatives by its data, or its tangents are not exact */
+  size_t solved_size;
 };
 
 /* Components of strain and stress in `dim` dimensions. */

@@ -23,6 +23,9 @@ struct _n_HycoFEPoints {
   const PetscReal **constant;  /* by run: HYCO_MAX_DECLARED */
   Data data[BESIDE];           /* the first: at the parameters */
   PetscReal t0, t1;
+  PetscBool fresh; /* no slope of this step has been taken */
+  char *solved;    /* by point: solved_size bytes of the largest law */
+  size_t size;
   PetscReal *elastic, *stress;                           /* n x n_sigma: strain without thermal strain */
   PetscReal *state0, *state, *nothing;                   /* at the begin and the end of the step */
   PetscReal *slope0, *slope;                             /* by parameter: n_state */
@@ -39,8 +42,9 @@ PetscErrorCode HycoFEPointsDestroy(HycoFEPoints *points)
   for (PetscInt k = 0; k < BESIDE; k++)
     HycoFreeAll(&p->data[k].x, &p->data[k].temperature, &p->data[k].thermal, &p->data[k].strain, &p->data[k].weight,
                 &p->data[k].memory);
-  HycoFreeAll(&p->point, &p->run, &p->state_at, &p->constant, &p->elastic, &p->stress, &p->state0, &p->state,
-              &p->nothing, &p->slope0, &p->slope, &p->along, &p->by_stress, &p->by_lost, &p->change, &p->hot, points);
+  HycoFreeAll(&p->solved, &p->point, &p->run, &p->state_at, &p->constant, &p->elastic, &p->stress, &p->state0,
+              &p->state, &p->nothing, &p->slope0, &p->slope, &p->along, &p->by_stress, &p->by_lost, &p->change, &p->hot,
+              points);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -73,6 +77,8 @@ PetscErrorCode HycoFEPointsCreate(HycoFE fe, PetscInt n, const PetscInt point[],
   for (PetscInt r = 0; r < p->n_runs; r++)
     p->state_at[r + 1] = p->state_at[r] + (p->run[r + 1] - p->run[r]) * LawOf(p, r)->n_state;
   p->n_state = p->state_at[p->n_runs];
+  for (PetscInt r = 0; r < p->n_runs; r++) p->size = PetscMax(p->size, LawOf(p, r)->solved_size);
+  PetscCall(PetscMalloc1(p->size * (size_t)n + 1, &p->solved));
   PetscCall(PetscCalloc1(p->n_runs * HYCO_MAX_DECLARED + 1, &p->constant));
   for (PetscInt k = 0; k < BESIDE; k++) {
     PetscCall(PetscMalloc1(3 * n + 1, &p->data[k].x));
@@ -203,6 +209,7 @@ PetscErrorCode HycoFEPointsStep(HycoFEPoints p, const PetscReal u[], PetscReal t
   PetscFunctionBegin;
   p->t0 = t0;
   p->t1 = t1;
+  p->fresh = PETSC_TRUE;
   for (PetscInt k = 1; k < BESIDE; k++) p->data[k].there = PETSC_FALSE;
   PetscCall(TakeData(p, u, &p->data[0], p->constant));
   for (PetscInt i = 0; i < p->n * ns; i++)
@@ -319,10 +326,11 @@ PetscErrorCode HycoFEPointsSlope(HycoFEPoints p, PetscInt k, const PetscReal wei
       for (PetscInt i = 0; i < n && moves; i++)
         p->change[at * HYCO_MAX_DECLARED + j * n + i] = SUM(p, id, weight, memory, at * HYCO_MAX_DECLARED + j * n + i);
     }
-    PetscCall((*LawOf(p, r)->slopes)(LawOf(p, r), &m, 1, &d));
+    PetscCall((*LawOf(p, r)->slopes)(LawOf(p, r), &m, p->fresh, p->solved + p->size * (size_t)at, &d));
     rate = PetscMax(rate, d.rate);
     apart = PetscMax(apart, d.apart);
   }
+  p->fresh = PETSC_FALSE;
   /* On the border of yielding: only where the derivative stays there is it that of both sides. */
   *smooth = (PetscBool)(apart <= 1e-7 * rate);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -515,16 +515,16 @@ static void Slope(const HycoFlowRule *rule, const HycoMaterialPoints *m, PetscIn
 }
 
 /* A HycoMaterialSlopes. */
-static PetscErrorCode Slopes(HycoMaterial material, const HycoMaterialPoints *m, PetscInt n, HycoMaterialSlope d[])
+static PetscErrorCode Slopes(HycoMaterial material, const HycoMaterialPoints *m, PetscBool fresh, void *solved,
+                             HycoMaterialSlope *d)
 {
   const HycoFlowRule *rule = (const HycoFlowRule *)material->data;
+  Solved *s = (Solved *)solved;
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < m->n; i++) {
-    Solved s;
-
-    TakeSolved(rule, m, i, &s);
-    for (PetscInt k = 0; k < n; k++) Slope(rule, m, i, &s, &d[k]);
+    if (fresh) TakeSolved(rule, m, i, &s[i]);
+    Slope(rule, m, i, &s[i], d);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -566,6 +566,7 @@ PetscErrorCode HycoFlowEnd(HycoMaterial material, const HycoFlowRule *rule)
   PetscCall(HycoMaterialSetLinear(material, PETSC_FALSE));
   material->data = (void *)(uintptr_t)rule;
   material->slopes = Slopes;
+  material->solved_size = sizeof(Solved);
   PetscCall(HycoMaterialSetOps(material, &ops));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
