@@ -140,7 +140,8 @@ PetscErrorCode HycoFOMMeasureQuantities(HycoFOM f, PetscReal value[])
 
   PetscFunctionBegin;
   if (!f->scene->n_quantities) PetscFunctionReturn(PETSC_SUCCESS);
-  if (HycoSceneHasFieldOutputs(f->scene)) PetscCall(HycoFOMStress(f));
+  /* Reactions need none. */
+  if (HycoSceneHasOutputs(f->scene, HYCO_QUANTITY_MAX, HYCO_QUANTITY_MEAN)) PetscCall(HycoFOMStress(f));
   if (HycoSceneHasContactOutputs(f->scene)) PetscCall(SumContacts(f));
   /* A product with K on all unknowns: only where an output asks for it. */
   if (HycoSceneHasReactions(f->scene)) {
