@@ -142,6 +142,9 @@ class Overhang(Case):
         self.assertEqual(rows['converged'].tolist(), [1, 0])
         for name in rows.dtype.names:
             self.assertEqual(bool(np.isnan(rows[name][1])), name not in ('load', 'soft', 'kkt_max', 'converged', 'iterations', 'seconds'), name)
+        run = self.run_raw('predict', '-model', 'm.h5', '-mu', '-6,1', '-extrapolate')
+        self.assertEqual(run.returncode, 1)
+        self.assertIn('this load lifts it off; no support keeps body block from moving along (0, 1, 0)', run.stderr)
         # a fit that begins at the load 0 goes on from there
         full = self.hyco('solve', '-scene', 'scene.yaml', '-mu', '0.01,1')
         fit = self.hyco('fit', '-model', 'm.h5', '-target_rise', repr(full['outputs']['rise']), '-hold_soft', 1, '-mu_load', 0)
