@@ -87,14 +87,16 @@ typedef struct {
   HycoAlikeGroups *alike;
   PetscInt n_groups; /* of the mesh; by group: */
   const char **group;
-  PetscBool *used, *empty;   /* some entry names it; it has no node of a body */
-  PetscInt n_without;        /* largest number of contacts between fixed unknowns */
-  char regularised[512];     /* motions that -hyco_regularise removes; "": none */
-  PetscInt n_motions, loose; /* rigid motions that no support keeps; those of bodies that are not rigid */
-  char **motion;             /* their names */
-  char bodies[1024];         /* how the parameters enter the bodies; "": not of this scene */
-  PetscReal bytes, resident; /* memory of a factor; of the processes now, all ranks */
-  PetscReal first, next;     /* estimated seconds of a solve with a new stiffness, with the last one; on each rank */
+  PetscBool *used, *empty;      /* some entry names it; it has no node of a body */
+  PetscInt n_without;           /* largest number of contacts between fixed unknowns */
+  char regularised[512];        /* motions that -hyco_regularise removes; "": none */
+  PetscInt n_systems, n_lifted; /* assembled systems; those whose loads no contact forces balance (not with friction) */
+  char lifted[1024];            /* the point of the first of these, and why a solve fails there; "": none */
+  PetscInt n_motions, loose;    /* rigid motions that no support keeps; those of bodies that are not rigid */
+  char **motion;                /* their names */
+  char bodies[1024];            /* how the parameters enter the bodies; "": not of this scene */
+  PetscReal bytes, resident;    /* memory of a factor; of the processes now, all ranks */
+  PetscReal first, next;        /* estimated seconds of a solve with a new stiffness, with the last one; on each rank */
   PetscInt
       body_values; /* assumed values of the parameters that change bodies, of a model of bodies; 0: no such model */
   PetscReal body_training[2], body_prediction; /* estimated seconds of its training, held-out solutions included, at

@@ -82,6 +82,8 @@ typedef struct {
       loose; /* bodies: the contact forces leave a motion of a body free, along which its position is arbitrary; on a path at
                            a listed time with forces, with friction also at a time before. Displacements, outputs of them and
                            the work of friction then have no estimate */
+  char why
+      [512]; /* bodies: which motion of a body the loads have work on, of a reason below 0; "": HycoReasonName() says all */
 } HycoPrediction;
 
 /* Result of the scan for a singular reduced stiffness in the parameters' ranges. */

@@ -401,6 +401,12 @@ PetscErrorCode HycoBodiesView(HycoROM model, PetscViewer viewer);
 PetscErrorCode HycoBodiesDestroyModel(HycoROM model);
 /* theta of node k of the grid of all values; the number of nodes. */
 PetscInt HycoBodiesGrid(HycoSubstructures bodies, PetscInt k, PetscReal theta[]);
+/* Names the body that moves most with the motions d[p] at the forces L, as full order does. */
+PetscErrorCode HycoBodiesNameMotion(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal L[],
+                                    const PetscReal d[], char name[HYCO_LINE]);
+/* After a solve that failed: whether no pressures balance the loads on the rigid motions; name: how the body moves. */
+PetscErrorCode HycoBodiesLifts(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal L[],
+                               char name[HYCO_LINE], PetscBool *lifts);
 /* The residuals at the contacts, recomputed from U and the forces; `stationarity` is that of floating bodies. */
 void HycoBodiesMeasure(HycoROM model, HycoKKT *kkt);
 PetscReal HycoBodiesUnbalanced(HycoBodiesWork work);

@@ -105,6 +105,9 @@ PetscErrorCode HycoFOMSetLambda(HycoFOM fom, const PetscReal lambda[]);
 PetscErrorCode HycoFOMWriteForces(HycoFOM fom, HycoH5 h5, const char name[]);
 /* Updates fe and fe_surface to mu; on several ranks also the masters on moved surfaces. Collective. */
 PetscErrorCode HycoFOMSetParameters(HycoFOM fom, const PetscReal mu[]);
+/* Why the solver would fail with the system just assembled, as no contact forces balance its loads; "": it would not, or with
+   friction. Collective. */
+PetscErrorCode HycoFOMLifts(HycoFOM fom, char why[HYCO_LINE]);
 /* K, F, B, D at mu, in the system. Collective. */
 PetscErrorCode HycoFOMAssemble(HycoFOM fom, const PetscReal mu[]);
 /* After a solve: u, u_surface and lambda of U and Lambda. Collective. */

@@ -154,9 +154,9 @@ HycoSolverForm HycoSolverFindForm(HycoSolver s, const char name[]);
 PetscErrorCode HycoSolverAcceptingForm(HycoSolver s, HycoSolverForm stay, HycoSolverForm *form, char why[HYCO_LINE]);
 /* Writes the method into s->method: "active_set dual", "tao gpcg dual". */
 PetscErrorCode HycoSolverNameMethod(HycoSolver s, const char form[]);
-/* After a failure with a singular K: whether no contact forces balance the load on its null space; for too many
-   contacts whether the residual of equilibrium is large. Collective. */
-PetscErrorCode HycoSolverLifts(HycoSolver s, Vec L, PetscBool *lifts);
+/* With a singular K: whether no contact forces balance the load on its null space; L then has those that come nearest.
+   Collective. */
+PetscErrorCode HycoSystemLifts(HycoSystem system, Vec L, PetscBool *lifts);
 /* Sets x = 0, L = 0 and the reason, for a K that cannot be factored. */
 PetscErrorCode HycoSolverGiveUp(HycoSolver s, Vec x, Vec L);
 /* Whether the chosen Tao type requires a symmetric system. */

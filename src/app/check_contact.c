@@ -136,5 +136,9 @@ PetscErrorCode CheckReportMotions(Check *check)
         "%d rigid motion%s prevented only by contact: full order can solve this if the loads press the bodies "
         "together, and so can models of bodies, hybrid and projection-based ones",
         (int)in->loose, in->loose > 1 ? "s are" : " is");
+  cJSON_AddNumberToObject(check->json, "n_lifted", in->n_lifted);
+  if (in->n_lifted)
+    CheckReportWarning(check, "solve fails at %d of the %d points assembled, the first %s", (int)in->n_lifted,
+                       (int)in->n_systems, in->lifted);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -200,9 +200,9 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
     }
   }
   PetscCall(DriverCheckLeft());
-  HycoCheck(p.reason > 0, "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written", HycoReasonName(p.reason),
-            (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
-            (double)p.kkt.complementarity);
+  HycoCheck(p.reason > 0, "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written",
+            p.why[0] ? p.why : HycoReasonName(p.reason), (double)p.kkt.stationarity, (double)p.kkt.penetration,
+            (double)p.kkt.adhesion, (double)p.kkt.complementarity);
   /* After the check of convergence, which a gradient requires. */
   if (derives) HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetGradient(model, &gradient));
   if (output[0] && (why[0] || fallback->displacement))

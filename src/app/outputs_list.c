@@ -51,6 +51,7 @@ static const Written written[] = {
     {"report", "check", "contacts[].n_between_nodes", "count", "-", "slave nodes without a master node opposite"},
     {"report", "check", "contacts[].slave_over_master", "number", "-", "as of ties"},
     {"report", "check solve", "n_without_effect", "count", "-", "contacts between fixed displacements"},
+    {"report", "check", "n_lifted", "count", "-", "assembled points at which no contact forces balance the loads"},
     {"report", "check", "free_motions", "texts", "-", "rigid motions that only contact prevents"},
     {"report", "check solve", "regularised", "text", "-", "motions that -hyco_regularise removed"},
     {"report", "check", "parameters.NAME", "texts", "-", "what a parameter, the time or a table affects"},

@@ -39,7 +39,7 @@ static PetscErrorCode Relative(HycoFOM f, const PetscReal u[], PetscReal *relati
 
 /* The motion on which F - B^T L has work; "" if it has none. Collective. With the contact forces L as found: what is
    left of F on the motions that supports leave free (F - B^T L is orthogonal to them in equilibrium). */
-static PetscErrorCode NameLifted(HycoFOM f, Vec L, char name[HYCO_LINE])
+static PetscErrorCode NameLifted(HycoFOM f, Mat Bt, Vec L, char name[HYCO_LINE])
 {
   PetscReal *coefficient, work = 0;
   HycoMotions motions;
@@ -51,8 +51,7 @@ static PetscErrorCode NameLifted(HycoFOM f, Vec L, char name[HYCO_LINE])
   PetscCall(HycoFOMMotionVectors(f, &motions, &v));
   PetscCall(VecDuplicate(f->F, &rest));
   PetscCall(VecCopy(f->F, rest));
-  /* On a path with friction L has the rows with tangents. */
-  if (L) PetscCall(MatMult(f->path ? f->path->Bt : f->Bt, L, rest));
+  if (L) PetscCall(MatMult(Bt, L, rest));
   if (L) PetscCall(VecAYPX(rest, -1, f->F));
   PetscCall(PetscMalloc1(motions.n, &coefficient));
   PetscCall(VecMDot(rest, motions.n, v, coefficient));
@@ -153,7 +152,8 @@ PetscErrorCode HycoFOMJudge(HycoFOM f, const PetscReal u[], Vec L, PetscReal ene
   else if (*reason > 0 && !(energy_defect <= HYCO_MOST_DEFECT))
     *reason = HYCO_DIVERGED_ENERGY;
   HycoFormat(why, "%s", *reason < 0 ? HycoReasonName(*reason) : "");
-  if (*reason == HYCO_DIVERGED_FLOATING) PetscCall(NameLifted(f, L, name));
+  if (*reason == HYCO_DIVERGED_FLOATING) /* on a path with friction L has the rows with tangents */
+    PetscCall(NameLifted(f, f->path ? f->path->Bt : f->Bt, L, name));
   if (*reason == HYCO_DIVERGED_FLOATING && name[0])
     HycoFormat(why, "%s; no support keeps %s",
                f->path && f->path->rubs ? "not converged: no contact forces with this friction balance the load"
@@ -163,5 +163,24 @@ PetscErrorCode HycoFOMJudge(HycoFOM f, const PetscReal u[], Vec L, PetscReal ene
     HycoFormat(why, "%s (%.1e times the mesh's extent)", HycoReasonName(*reason), (double)*relative);
   if (*reason == HYCO_DIVERGED_ENERGY)
     HycoFormat(why, "%s (identity to %.1e)", HycoReasonName(*reason), (double)energy_defect);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of the system just assembled, without a solve; with friction it is not decided. Collective. */
+PetscErrorCode HycoFOMLifts(HycoFOM f, char why[HYCO_LINE])
+{
+  char name[HYCO_LINE];
+  PetscBool lifts = PETSC_FALSE;
+  Vec L;
+
+  PetscFunctionBegin;
+  why[0] = '\0';
+  if (!f->n_contacts || HycoSceneHasFriction(f->scene)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicate(f->Lambda, &L));
+  PetscCall(HycoSystemLifts(f->system, L, &lifts));
+  if (lifts) PetscCall(NameLifted(f, f->Bt, L, name));
+  if (lifts)
+    HycoFormat(why, "%s%s%s", HycoReasonName(HYCO_DIVERGED_FLOATING), name[0] ? "; no support keeps " : "", name);
+  PetscCall(VecDestroy(&L));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -72,6 +72,9 @@ static PetscErrorCode Assemble(HycoFOM f, HycoInspection *in, const PetscReal v[
   HycoCatch(HycoFOMAssemble(f, v), ierr, message);
   PetscCall(NamePoint(f->scene, v, place));
   HycoCheck(!ierr, "%s%s", place, message);
+  PetscCall(HycoFOMLifts(f, message));
+  in->n_systems++;
+  if (message[0] && !in->n_lifted++) PetscCall(PetscSNPrintf(in->lifted, sizeof(in->lifted), "%s%s", place, message));
   HycoOnRoot(HycoComm(f), Measure(f, in, v, first));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

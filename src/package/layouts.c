@@ -67,7 +67,8 @@ static const HycoMember prediction[] = {
   F(estimated_error_quantity), F(inconsistency), F(inconsistent), F(unseen),
   F(unseen_feature), F(beyond), F(gives_forces), F(interpolation_error), F(kkt.stationarity), F(kkt.penetration),
   F(kkt.adhesion), F(kkt.complementarity), F(kkt.rounding), F(method), F(reason), F(seconds.setup),
-  F(seconds.assemble), F(seconds.factor), F(seconds.solve), F(seconds.total), F(n_dependent), F(loose)};
+  F(seconds.assemble), F(seconds.factor), F(seconds.solve), F(seconds.total), F(n_dependent), F(loose),
+  F(why)};
 #undef F
 
 #define F(member) FIELD(HycoGradient, member)

@@ -98,7 +98,8 @@ static PetscErrorCode Evaluate(Fit *f, const PetscReal x[])
   ToParameters(f, x, mu);
   PetscCall(HycoROMPredict(f->model, f->n_par, mu));
   PetscCall(HycoROMGetPrediction(f->model, &f->prediction));
-  HycoCheck(f->prediction.reason > 0, "a prediction of the fit failed: %s", HycoReasonName(f->prediction.reason));
+  HycoCheck(f->prediction.reason > 0, "a prediction of the fit failed: %s",
+            f->prediction.why[0] ? f->prediction.why : HycoReasonName(f->prediction.reason));
   PetscCall(Differentiate(f, mu, &g));
   Misfit(f, &f->prediction, f->r);
   f->kink = PETSC_FALSE;

@@ -494,7 +494,8 @@ static PetscErrorCode Check(HycoROM m)
             "a model of type %s has no gradients; train one with -hyco_model_type bodies, hybrid or projection",
             m->model->type);
   PetscCheck(m->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoROMPredict() before HycoROMGetGradient()");
-  HycoCheck(m->prediction.reason > 0, "there is no gradient: %s", HycoReasonName(m->prediction.reason));
+  HycoCheck(m->prediction.reason > 0, "there is no gradient: %s",
+            m->prediction.why[0] ? m->prediction.why : HycoReasonName(m->prediction.reason));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -94,6 +94,7 @@ PetscErrorCode HycoROMPredict(HycoROM m, PetscInt n, const PetscReal mu[])
   begin = HycoNow();
   m->remainder = 0;
   p->loose = PETSC_FALSE;
+  p->why[0] = '\0';
   PetscUseTypeMethod(m, solve, mu);
   /* a path is reconstructed at its listed times */
   if (m->ops->reconstruct && m->reconstruct && p->reason > 0 && !m->model->scene->n_times)

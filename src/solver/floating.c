@@ -3,40 +3,14 @@
 
     z_i.F = sum over contacts of (B z_i)_j L_j,   L >= 0
 
-  The proximal point method decides it with a unit flexibility in place of S, so that no factor of K is needed.
+  Nonnegative least squares decide it, without a factor of K.
 */
 #include <hycoalgorithms.h>
 #include <hycosolverimpl.h>
 
-#define LEFT 1e-6 /* of the square of a motion: below, nothing is left of it */
-/* The matrix of the problem is dense. */
-#define HYCO_MOST_CONTACTS 3000
-
-/* M = [0 A; -A^T I] and q = (-f', 0), with the motions z in place of pinned unknowns. Rows of contacts are gathered:
-   the problem is small and identical on every rank. Only whether contact can balance the loads on the motions is asked,
-   not the solution. */
-static PetscErrorCode Fill(HycoSystem y, PetscInt p, const Vec z[], PetscReal M[], PetscReal q[])
-{
-  const size_t n = (size_t)(p + y->m);
-  PetscReal *A;
-
-  PetscFunctionBegin;
-  PetscCall(HycoSystemWork(y));
-  PetscCall(PetscMalloc1(p * y->m + 1, &A));
-  PetscCall(HycoMotionRows(y->B, p, z, y->work_L, A));
-  for (PetscInt i = 0; i < p; i++) {
-    PetscCall(VecDot(y->F, z[i], &q[i]));
-    q[i] = -q[i];
-    for (PetscInt j = 0; j < y->m; j++) {
-      M[(size_t)(p + j) * n + (size_t)i] = A[j * p + i];
-      M[(size_t)i * n + (size_t)(p + j)] = -A[j * p + i];
-    }
-  }
-  /* Any definite block would do: feasibility does not depend on it. */
-  for (size_t j = (size_t)p; j < n; j++) M[j * n + j] = 1;
-  PetscCall(PetscFree(A));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+#define LEFT     1e-6  /* of the square of a motion: below, nothing is left of it */
+#define BALANCED 1e-9  /* of the load on the motions: below, forces balance it */
+#define ROUNDING 1e-12 /* of all loads: below, their work on the motions is round-off */
 
 /* Adds normal forces to the forces r that come nearest to the load f, so that the rest f - A r is a motion along which no
    contact opens: the one by which the bodies slide. First of all contacts, then, if that leaves nothing, of those with a
@@ -106,39 +80,41 @@ static PetscErrorCode Slides(HycoSystem y, PetscInt p, const Vec z[], Vec L, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without other cones: the nearest forces of least squares in L, whose rest is a motion that closes no contact. */
+static PetscErrorCode Lifts(HycoSystem y, PetscInt p, const Vec z[], Vec L, PetscBool *lifts)
+{
+  PetscReal *A, *f, *row, all, size = 0, rest;
+  PetscInt lo, hi;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSystemWork(y));
+  PetscCall(PetscMalloc3(p * y->m, &A, p, &f, y->m, &row));
+  PetscCall(HycoMotionRows(y->B, p, z, y->work_L, A));
+  for (PetscInt i = 0; i < p; i++) {
+    PetscCall(VecDot(y->F, z[i], &f[i]));
+    size += f[i] * f[i];
+  }
+  PetscCall(VecNorm(y->F, NORM_1, &all));
+  PetscCall(HycoNNLS(p, y->m, A, f, row, &rest));
+  *lifts = (PetscBool)(rest > PetscMax(BALANCED * PetscSqrtReal(size), ROUNDING * all));
+  PetscCall(VecGetOwnershipRange(L, &lo, &hi));
+  if (*lifts) PetscCall(HycoVecWrite(L, hi - lo, row + lo));
+  PetscCall(PetscFree3(A, f, row));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Whether the load lifts a floating body off, or moves it along: no contact forces balance it on the rigid modes. Otherwise
    a failure of the solver is its own. Collective. */
-PetscErrorCode HycoSolverLifts(HycoSolver s, Vec L, PetscBool *lifts)
+PetscErrorCode HycoSystemLifts(HycoSystem y, Vec L, PetscBool *lifts)
 {
-  HycoSystem y = s->system;
-  HycoLCP lcp = {.n = y->m, .symmetric = PETSC_TRUE};
-  HycoLCPStatus status;
-  PetscInt its = 0, n;
-  PetscReal *M, *q, *z;
-  PetscBool *active;
+  PetscInt p;
   const Vec *motion;
 
   PetscFunctionBegin;
-  /* The proximal point method ends on a ray if the problem is infeasible. */
   *lifts = PETSC_FALSE;
   if (!y->K) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoKernelVectors(y->K, &lcp.p, &motion));
-  if (lcp.p && y->blocks) {
-    PetscCall(Slides(y, lcp.p, motion, L, lifts));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  /* For too many contacts, where the dense problem is not set up: the residual of equilibrium says it approximately. */
-  *lifts = (PetscBool)(lcp.p > 0 && s->kkt.stationarity > s->rtol);
-  if (!lcp.p || !y->m || y->m > HYCO_MOST_CONTACTS) PetscFunctionReturn(PETSC_SUCCESS);
-  n = lcp.p + y->m;
-  PetscCall(PetscCalloc1((size_t)n * (size_t)n, &M));
-  PetscCall(PetscCalloc3(n, &q, n, &z, y->m, &active));
-  PetscCall(Fill(y, lcp.p, motion, M, q));
-  lcp.M = M;
-  lcp.q = q;
-  PetscCall(HycoLCPProximal(&lcp, active, z, &its, &status));
-  *lifts = (PetscBool)(status == HYCO_LCP_RAY);
-  PetscCall(PetscFree(M));
-  PetscCall(PetscFree3(q, z, active));
+  PetscCall(HycoKernelVectors(y->K, &p, &motion));
+  if (!p || !y->m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(y->blocks ? Slides(y, p, motion, L, lifts) : Lifts(y, p, motion, L, lifts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -540,7 +540,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   }
   /* A failure with floating bodies is either a load that lifts them off or one of the solver. */
   if (s->reason < 0 && s->system->K) PetscCall(HycoKernelSize(s->system->K, &n_free));
-  if (n_free) PetscCall(HycoSolverLifts(s, L, &lifts));
+  if (n_free) PetscCall(HycoSystemLifts(s->system, L, &lifts));
   if (n_free) s->reason = lifts ? HYCO_DIVERGED_FLOATING : HYCO_DIVERGED_HELD;
   /* What was passed for one solve ends here, whether or not it was used. */
   s->free = NULL;

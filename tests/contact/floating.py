@@ -59,12 +59,16 @@ class Block(Case):
         self.near(r['total_contact_force'], WIDTH * 100, 1e-10)
 
     def test_taken_away(self):
-        """A load that lifts a floating body is refused, and no file is left."""
+        """A load that lifts a floating body is refused, and no file is left; check names the corner of the ranges."""
         run = self.run_raw('solve', '-scene', self.scene(PAIR), '-mu', '0.04,-1', '-output', 'no.xdmf')
         self.assertEqual(run.returncode, 1)
         self.assertIn('a body is held by contact only, and this load lifts it off; no support keeps body block from moving '
                       'along (0, 1, 0)', run.stderr)
         self.assertFalse(os.path.exists(self.path('no.h5')))
+        for ranks in (0, 2):  # check says so without a solve
+            found = self.hyco('check', '-scene', self.scene(PAIR), ranks=ranks)
+            self.assertEqual((found['n_lifted'], len([w for w in found['warnings'] if 'solve fails at 2 of the 5 points assembled, the first at crown = 0, '
+                             'press = -100: not converged: a body is held by contact only, and this load lifts it off; no support keeps body block' in w])), (2, 1))
 
     def test_other_types(self):
         """Methods that cannot solve for floating bodies name the one that can."""
@@ -138,6 +142,9 @@ class Overhang(Case):
         self.assertEqual(rows['converged'].tolist(), [1, 0])
         for name in rows.dtype.names:
             self.assertEqual(bool(np.isnan(rows[name][1])), name not in ('load', 'soft', 'kkt_max', 'converged', 'iterations', 'seconds'), name)
+        run = self.run_raw('predict', '-model', 'm.h5', '-mu', '-6,1', '-extrapolate')
+        self.assertEqual(run.returncode, 1)
+        self.assertIn('this load lifts it off; no support keeps body block from moving along (0, 1, 0)', run.stderr)
         # a fit that begins at the load 0 goes on from there
         full = self.hyco('solve', '-scene', 'scene.yaml', '-mu', '0.01,1')
         fit = self.hyco('fit', '-model', 'm.h5', '-target_rise', repr(full['outputs']['rise']), '-hold_soft', 1, '-mu_load', 0)

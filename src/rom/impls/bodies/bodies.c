@@ -126,6 +126,22 @@ static PetscErrorCode ExpandAll(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Says of a solve that failed what full order says, if the loads lift a body off. */
+static PetscErrorCode NameLifted(HycoROM m, const HycoBodiesSurface *s)
+{
+  HycoPrediction *p = &m->prediction;
+  PetscBool lifts;
+  char name[HYCO_LINE] = "";
+
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesLifts((HycoBodiesWork)m->work, s, m->Lambda, name, &lifts));
+  if (!lifts) PetscFunctionReturn(PETSC_SUCCESS);
+  p->reason = HYCO_DIVERGED_FLOATING;
+  PetscCall(PetscSNPrintf(p->why, sizeof(p->why), "%s%s%s", HycoReasonName(p->reason),
+                          name[0] ? "; no support keeps " : "", name));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Assembly is the rows' search and gaps; a factor does not exist. The reason of the solver counts only if the
    recomputed residuals agree. */
 static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
@@ -152,6 +168,7 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
   p->reason = solved && HycoKKTMax(&p->kkt) > m->solver->rtol ? HYCO_DIVERGED_RESIDUAL : o->reason;
   /* As at full order: a method that ends without an answer of its own may have found it, but not beside the surfaces. */
   if (!o->lacks && HycoKKTMax(&p->kkt) <= m->solver->rtol) p->reason = HYCO_CONVERGED;
+  if (p->reason < 0) PetscCall(NameLifted(m, &s));
   PetscCall(PetscStrncpy(p->method, o->method, sizeof(p->method)));
   p->seconds.solve = HycoNow() - solve;
   PetscFunctionReturn(PETSC_SUCCESS);

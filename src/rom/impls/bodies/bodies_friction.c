@@ -331,10 +331,9 @@ PetscErrorCode HycoBodiesFrictionProbe(HycoBodiesFriction f, HycoBodiesWork o, c
 }
 
 /* The rigid motion of body b in the displacements U of its surface; *share: the sum of their squares. */
-static PetscErrorCode FitRigid(HycoBodiesFriction f, HycoBodiesWork o, PetscInt b, const PetscReal U[], HycoRigid *r,
+static PetscErrorCode FitRigid(HycoFE fe, HycoBodiesWork o, PetscInt b, const PetscReal U[], HycoRigid *r,
                                PetscReal *share)
 {
-  const HycoFE fe = f->normal.fe;
   const PetscInt dim = fe->dim, n_rigid = dim == 2 ? 3 : 6, lo = o->bodies->start[b], hi = o->bodies->start[b + 1];
   PetscReal gram[36] = {0}, inverse[36], right[6] = {0};
   PetscInt n = 0;
@@ -370,26 +369,28 @@ static PetscErrorCode FitRigid(HycoBodiesFriction f, HycoBodiesWork o, PetscInt 
 }
 
 /* Names the body that moves most with the motions d, as full order does. */
-static PetscErrorCode NameSlide(HycoBodiesFriction f, HycoBodiesWork o, const PetscReal d[], char name[HYCO_LINE])
+PetscErrorCode HycoBodiesNameMotion(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal L[],
+                                    const PetscReal d[], char name[HYCO_LINE])
 {
-  const HycoFE fe = f->normal.fe;
+  const HycoFE fe = s->fe;
+  const PetscInt p = o->bodies->p;
   PetscReal *U, *rest, *x, share, most = 0, one = 1;
   HycoRigid rigid = {0}, r;
   HycoMotions motions = {.n = 1, .rigid = &rigid};
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc3(fe->n_dof, &U, fe->n_dof, &rest, f->p, &x));
-  PetscCall(PetscArraycpy(x, o->x, f->p));
-  PetscCall(PetscArrayzero(o->x, f->p));
-  HycoBodiesGiven(o, &f->all, f->z + f->p);
-  HycoBodiesMove(o, &f->all, rest);
-  PetscCall(PetscArraycpy(o->x, d, f->p));
-  HycoBodiesGiven(o, &f->all, f->z + f->p);
-  HycoBodiesMove(o, &f->all, U);
-  PetscCall(PetscArraycpy(o->x, x, f->p));
+  PetscCall(PetscCalloc3(fe->n_dof, &U, fe->n_dof, &rest, p, &x));
+  PetscCall(PetscArraycpy(x, o->x, p));
+  PetscCall(PetscArrayzero(o->x, p));
+  HycoBodiesGiven(o, s, L);
+  HycoBodiesMove(o, s, rest);
+  PetscCall(PetscArraycpy(o->x, d, p));
+  HycoBodiesGiven(o, s, L);
+  HycoBodiesMove(o, s, U);
+  PetscCall(PetscArraycpy(o->x, x, p));
   for (PetscInt i = 0; i < fe->n_dof; i++) U[i] -= rest[i];
   for (PetscInt b = 0; b < o->bodies->n; b++) {
-    PetscCall(FitRigid(f, o, b, U, &r, &share));
+    PetscCall(FitRigid(fe, o, b, U, &r, &share));
     if (share > most) rigid = r;
     most = PetscMax(most, share);
   }
@@ -420,7 +421,7 @@ PetscErrorCode HycoBodiesFrictionSlides(HycoBodiesFriction f, HycoBodiesWork o, 
     for (PetscInt k = 0; k < p * n; k++) load[k % p] -= A[k] * r[k / p];
     for (PetscInt i = 0; i < p; i++) size = PetscMax(size, PetscAbsReal(load[i]));
     for (PetscInt i = 0; i < p && size > 0; i++) load[i] /= size;
-    PetscCall(NameSlide(f, o, load, name));
+    PetscCall(HycoBodiesNameMotion(o, &f->all, f->z + p, load, name));
   }
   PetscCall(PetscFree3(A, load, r));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -4,8 +4,10 @@
   complementarity problem is that of the contacts that these displacements close; those that its solution closes
   beside them join it. With bodies that contact alone holds it begins with some of all contacts.
 */
+#include <hycoalgorithms.h>
 #include <hycobodies.h>
 #include <hycotao.h>
+#include <petscblaslapack.h>
 #include <string.h>
 
 #define ROUNDS  60    /* of joining contacts */
@@ -1140,6 +1142,49 @@ void HycoBodiesNameFloating(HycoBodiesWork o, HycoScene scene, char name[HYCO_LI
     HycoFormat(list, "%s%s%s", before, n++ ? ", " : "", scene->body[k].name);
   }
   HycoFormat(name, "%s%s in its place", n > 1 ? "one of the bodies " : "body ", list);
+}
+
+#define BALANCES 1e-9 /* share of the load on the motions: below, forces balance it */
+
+/* By nonnegative least squares, as at full order: the rest is a motion that closes no contact. */
+PetscErrorCode HycoBodiesLifts(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal L[], char name[HYCO_LINE],
+                               PetscBool *lifts)
+{
+  const PetscInt p = o->bodies->p;
+  const PetscReal one = 1;
+  const PetscBLASInt rows = (PetscBLASInt)p, columns = (PetscBLASInt)s->n, each = 1;
+  PetscReal *A, *f, *force, *gram, size, rest = 0, most = 0;
+  PetscBool regular;
+
+  PetscFunctionBegin;
+  *lifts = PETSC_FALSE;
+  if (!p || o->lacks) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc4(p * s->n + 1, &A, p, &f, s->n + 1, &force, p * p, &gram));
+  for (PetscInt i = 0; i < p; i++) f[i] = HycoBodiesLoadWork(o, i);
+  for (PetscInt k = 0; k < s->n; k++) {
+    for (PetscInt e = o->row_start[k]; e < o->row_start[k + 1]; e++)
+      HycoBodiesAdd(p, o->row[e], o->Z + o->row_at[e] * p, A + k * p);
+  }
+  /* In coordinates in which the motions of the surfaces are orthonormal, as at full order. */
+  for (PetscInt i = 0; i < o->bodies->ns * p * p; i++) {
+    const PetscReal *z = o->Z + i / (p * p) * p;
+
+    gram[i % (p * p)] += z[i / p % p] * z[i % p];
+  }
+  PetscCall(HycoCholesky("U", p, gram, NULL, &regular));
+  if (regular) BLAStrsm_("L", "U", "T", "N", &rows, &columns, &one, gram, &rows, A, &rows);
+  if (regular) BLAStrsm_("L", "U", "T", "N", &rows, &each, &one, gram, &rows, f, &rows);
+  size = 0;
+  for (PetscInt i = 0; i < p; i++) size += f[i] * f[i];
+  PetscCall(HycoNNLS(p, s->n, A, f, force, &rest));
+  *lifts = (PetscBool)(rest > PetscMax(BALANCES * PetscSqrtReal(size), HycoBodiesLoadRounding(o)));
+  for (PetscInt k = 0; k < p * s->n; k++) f[k % p] -= A[k] * force[k / p];
+  if (regular) BLAStrsm_("L", "U", "N", "N", &rows, &each, &one, gram, &rows, f, &rows);
+  for (PetscInt i = 0; i < p; i++) most = PetscMax(most, PetscAbsReal(f[i]));
+  for (PetscInt i = 0; i < p && most > 0; i++) f[i] /= most;
+  if (*lifts) PetscCall(HycoBodiesNameMotion(o, s, L, f, name));
+  PetscCall(PetscFree4(A, f, force, gram));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* |L~|_W^2 = sum of f.(C f / kappa), from the displacements by the forces. `gram` holds the errors of R in the
