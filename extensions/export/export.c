@@ -1068,15 +1068,30 @@ static PetscErrorCode RunModel(Export *e, const PetscReal mu[], PetscInt j, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The size that errors of output k are relative to: its own, but a component of a contact's force has the largest of its
-   components, as one that vanishes by symmetry is round-off. */
-static PetscReal ScaleOf(PetscInt n, char *const name[], const PetscReal most[], PetscInt k)
+/* What outputs of one dimension are: 0 lengths, 1 stresses, 2 forces, 3 moments and works; 4 areas of contacts. */
+static int DimensionOf(const Export *e, PetscInt k)
 {
-  const char *force = strstr(name[k], ".force_");
+  const PetscInt each = e->m->model->mesh->dim + 2, at = (k - e->s->n_quantities) % each;
+  const HycoQuantity *q = &e->s->quantity[k];
+
+  if (k >= e->s->n_quantities) return at < each - 2 ? 2 : at == each - 2 ? 4 : 1;
+  if (q->kind == HYCO_QUANTITY_AREA) return 4;
+  if (q->kind == HYCO_QUANTITY_MOMENT || (q->kind == HYCO_QUANTITY_FRICTION && q->field == HYCO_FRICTION_WORK))
+    return 3;
+  if (q->kind >= HYCO_QUANTITY_PRESSURE) return 1;
+  if (q->kind >= HYCO_QUANTITY_REACTION) return 2;
+  return HycoQuantityOfStress(q) ? 1 : 0;
+}
+
+/* The size that errors of output k are relative to: the largest of its dimension, as one that vanishes by symmetry is round-off. */
+static PetscReal ScaleOf(const Export *e, const PetscReal most[], PetscInt k)
+{
+  const int dimension = DimensionOf(e, k);
   PetscReal scale = most[k];
 
-  for (PetscInt j = 0; force && j < n; j++) {
-    if (!strncmp(name[j], name[k], (size_t)(force - name[k]) + strlen(".force_"))) scale = PetscMax(scale, most[j]);
+  for (PetscInt j = 0; j < e->out.m.n_outputs; j++) {
+    if (DimensionOf(e, j) == dimension) scale = PetscMax(scale, most[j]);
+    if (DimensionOf(e, j) == 2 && dimension == 3) scale = PetscMax(scale, most[j] * HycoMeshLength(e->m->fe->mesh));
   }
   return scale;
 }
@@ -1124,10 +1139,10 @@ static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
     }
   }
   for (PetscInt k = 0; k < n; k++) {
-    const PetscReal scale = ScaleOf(n, e->out.name, most, k);
+    const PetscReal scale = ScaleOf(e, most, k);
 
     HycoCheck(worst[k] <= (e->flows ? FLOWS_AGREE : AGREES) * scale,
-              "export: the output %s of the program differs from the model's by %.1e of its largest value; the forces "
+              "export: the output %s of the program differs from the model's by %.1e of the largest value; the forces "
               "may not be unique%s",
               e->out.name[k], (double)(worst[k] / scale),
               e->flows ? ", or the choice of time steps hangs on the last digits" : "");

@@ -201,6 +201,7 @@ static PetscErrorCode TakeElement(const HycoFE fe, Surfaces *u)
   u->nf = el->nv;
   u->nq = el->nq;
   u->around = fe->formulation == HYCO_AXISYMMETRIC ? 2 * PETSC_PI : 0;
+  u->touches = HycoContactTouches(fe);
   PetscCall(PetscMalloc1(el->nq, &u->w));
   PetscCall(PetscMalloc1(el->nq * el->nv, &u->N));
   PetscCall(PetscMalloc1(2 * el->nq * el->nv, &u->dN));

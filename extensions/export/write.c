@@ -291,7 +291,8 @@ static PetscErrorCode WriteProgram(HycoExportModel *e, HycoScene s, const char p
   }
   ADD(t, "  .newton_rtol = %.17g,\n  .most_increment = %.17g,\n  .least = %.17g,\n", m->newton_rtol, m->most_increment,
       m->least);
-  ADD(t, "  .surfaces.around = %.17g,\n  .tolerance = %.17g};\n\n", m->surfaces.around, m->tolerance);
+  ADD(t, "  .surfaces.around = %.17g,\n  .surfaces.touches = %.17g,\n  .tolerance = %.17g};\n\n", m->surfaces.around,
+      m->surfaces.touches, m->tolerance);
   PetscCall(AddNamed(t, HycoExport_calls_c, prefix));
   PetscCall(AddNamed(t, s->n_times ? HycoExport_step_c : HycoExport_predict_c, prefix));
   PetscFunctionReturn(PETSC_SUCCESS);

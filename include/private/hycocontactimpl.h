@@ -197,6 +197,8 @@ PetscErrorCode HycoContactTangentRows(HycoFE fe, HycoPairs *pairs, const PetscIn
 PetscErrorCode HycoContactCountStill(HycoFE fe, const HycoPairs *pairs, const PetscInt start[], PetscInt *n);
 /* The gap that is stored for an empty row: positive, of the mesh's scale, and without meaning. */
 PetscReal HycoContactNoGap(HycoFE fe);
+/* Up to this size a distance between the surfaces as drawn is round-off, and counts as 0. */
+PetscReal HycoContactTouches(HycoFE fe);
 /* share[]: by contact of the scene whose given gap overlaps at every node by more than 1 % of an extent: the least overlap over
    the extent of its smaller body; else 0. fe: on all nodes of this rank, surface: on those of the contacts; gap: of the pairs,
    by HycoContactGeometry(). Collective. */

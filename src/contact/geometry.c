@@ -6,6 +6,11 @@
 /* Share of the mesh's length: the round-off of a mean of positions. */
 #define ROUND_OFF 1e-14
 
+PetscReal HycoContactTouches(HycoFE fe)
+{
+  return ROUND_OFF * HycoMeshLength(fe->mesh);
+}
+
 /* Removes from a normal the directions of released rigid motions at the contact, so that the discretisation of a
    surface does not resist them. At most dim - 1 directions, orthonormalised; nearly dependent ones are left out. */
 void HycoTurnNormal(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal n[3])
@@ -97,8 +102,7 @@ PetscReal HycoContactNoGap(HycoFE fe)
 static PetscErrorCode Gaps(HycoFE fe, HycoContact c, const HycoPairs *pairs, PetscInt first,
                            const HycoContactPoints *points, const PetscReal normal[], PetscReal gap[])
 {
-  /* Else -1: no gap is at most that, so that other types keep theirs to the last bit. */
-  const PetscReal zero = c->integrated ? ROUND_OFF * HycoMeshLength(fe->mesh) : -1;
+  const PetscReal zero = HycoContactTouches(fe);
 
   PetscFunctionBegin;
   if (c->ops->gap) PetscCall((*c->ops->gap)(c, points, normal, gap));
@@ -114,7 +118,7 @@ static PetscErrorCode Gaps(HycoFE fe, HycoContact c, const HycoPairs *pairs, Pet
     } else if (!c->ops->gap) {
       gap[i] = 0;
       for (PetscInt d = 0; d < 3; d++) gap[i] += n[d] * (x[d] - points->slave[3 * i + d]);
-      /* surfaces that touch have gaps of 0, and not the round-off of a sum over many nodes */
+      /* surfaces that touch have gaps of 0, and not the round-off of a sum: unloaded they would press with it */
       if (PetscAbsReal(gap[i]) <= zero) gap[i] = 0;
     }
   }

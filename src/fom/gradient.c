@@ -414,7 +414,7 @@ static PetscErrorCode Determine(Work *o)
                                     o->rubs ? HycoFrictionBefore(f->friction) : NULL, &o->tangent, &o->regular));
   if (!f->n_contacts || o->rubs) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecNorm(o->L, NORM_INFINITY, &most));
-  if (most > 0 && (!o->regular || !HycoSolverTangentUndecided(o->tangent))) PetscCall(HycoFOMNameLoose(f, name));
+  if (most > 0) PetscCall(HycoFOMNameLoose(f, name));
   o->regular = (PetscBool)(o->regular && !name[0]);
   if (o->along && !o->regular) {
     PetscCall(VecNorm(o->U, NORM_INFINITY, &moved));

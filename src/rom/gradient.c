@@ -198,7 +198,7 @@ static PetscErrorCode Close(Work *o)
   if (o->m->model->scene->n_times) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(o->regular || most > 0, HYCO_TANGENT_UNPRESSED);
   /* Where forces hold a body only by round-off the matrix may be regular. */
-  HycoCheck(!o->prediction.loose || (o->regular && HycoTangentUndecided(o->tangent)), HYCO_GRADIENT_LOOSE, o->m->loose);
+  HycoCheck(!o->prediction.loose, HYCO_GRADIENT_LOOSE, o->m->loose);
   HycoCheck(o->regular,
             "the forces of the model's closed contacts are not unique here, or round-off, and have no derivative");
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -41,7 +41,7 @@ typedef struct {
 /* n_nodes 0: no surface moves. */
 typedef struct {
   PetscInt dim, n_nodes, nf, nq, n_searches, n_facets; /* nodes and points of a facet; of the largest master */
-  double around;                                       /* 2 pi in an axisymmetric scene; 0 */
+  double around, touches;                              /* 2 pi in an axisymmetric scene; 0; gaps that are round-off */
   DATA double *w, *N, *dN;                             /* nq; nq x nf; nq x nf x 2 */
   DATA Surface *surface;
   DATA Facing *search;

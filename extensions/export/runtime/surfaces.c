@@ -114,6 +114,7 @@ static int meet(const Surfaces *s, const Facing *h, const Room *r, const double 
       for (PetscInt a = 0; a < at.n; a++) x += at.weight[a] * r->X[3 * at.node[a] + c];
       m->gap += m->normal[c] * (x - r->X[3 * of + c]);
     }
+    if (fabs(m->gap) <= s->touches) m->gap = 0;
     if (at.n && !add_node(s, of, 1, value, m)) return 0;
     for (PetscInt a = 0; a < at.n; a++) {
       m->master[a] = at.node[a];
