@@ -182,6 +182,8 @@ typedef struct _n_HycoTangent *HycoTangent;
    zero, the force by the displacement that it causes. size: of the gaps or of the displacements of the contacts. */
 PetscErrorCode HycoTangentStates(PetscInt n, const PetscReal L[], const PetscReal w[], PetscReal size,
                                  const PetscReal flexibility[], PetscInt state[]);
+/* For states with which HycoTangentCreate() is not regular: undecided contacts whose small force is none of round-off are closed; *more: some were. */
+void HycoTangentCloseMore(PetscInt n, const PetscReal L[], PetscInt state[], PetscBool *more);
 /* Whether a contact is closed or undecided, when its flexibility is not known. */
 PetscBool HycoTangentMayTouch(PetscReal L, PetscReal w, PetscReal size);
 /* Why there is no derivative where the matrix is singular and no contact has a force. */

@@ -12,6 +12,8 @@
 #define DEPENDENT 1e-10 /* share of its flexibility that a contact has left, if its row depends on closed ones */
 #define NOTHING   1e-9  /* share of its terms below which the change of a gap is round-off */
 #define REGULAR   1e-14 /* smallest pivot over the largest of the scaled matrix */
+#define FREE      1e-9  /* share of a motion's largest entry of all contacts: less in those of the set is round-off */
+#define PUSHES    1e-11 /* share of the largest force: more is none of round-off */
 
 struct _n_HycoTangent {
   PetscInt p, n;             /* unknowns x; contacts */
@@ -53,10 +55,37 @@ PetscErrorCode HycoTangentStates(PetscInt n, const PetscReal L[], const PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Where the closed contacts do not determine the solution, small forces do: those above round-off close theirs. *more: there
+   are some. */
+void HycoTangentCloseMore(PetscInt n, const PetscReal L[], PetscInt state[], PetscBool *more)
+{
+  PetscReal most = 0;
+
+  *more = PETSC_FALSE;
+  for (PetscInt i = 0; i < n; i++) most = PetscMax(most, L[i]);
+  for (PetscInt i = 0; i < n; i++) {
+    if (state[i] != HYCO_TANGENT_UNDECIDED || !(L[i] > PUSHES * most)) continue;
+    state[i] = HYCO_TANGENT_CLOSED;
+    *more = PETSC_TRUE;
+  }
+}
+
 /* A looser question than the state: contacts for which it is false need no row of the derivative. */
 PetscBool HycoTangentMayTouch(PetscReal L, PetscReal w, PetscReal size)
 {
   return (PetscBool)(L > 0 || w <= NEAR * size);
+}
+
+/* Whether no contact of the set acts on x[j], unlike others. */
+static PetscBool IsFree(HycoTangent t, PetscBool rigid, const PetscReal M[], PetscInt j)
+{
+  const size_t n = (size_t)(t->p + t->n);
+  const PetscInt first = rigid ? t->p : 0; /* beyond what is round-off between motions; of the set too */
+  PetscReal all = 0, set = 0;
+
+  for (size_t i = (size_t)first; i < n; i++) all = PetscMax(all, PetscAbsReal(M[i * n + (size_t)j]));
+  for (PetscInt i = first; i < t->n_set; i++) set = PetscMax(set, PetscAbsReal(M[(size_t)t->set[i] * n + (size_t)j]));
+  return (PetscBool)(set <= FREE * all);
 }
 
 /* The columns of M of the set, scaled to entries of order 1: the rows of x and of contacts have different units. */
@@ -64,7 +93,7 @@ static PetscErrorCode Factor(HycoTangent t, PetscBool rigid, const PetscReal M[]
 {
   const size_t n = (size_t)(t->p + t->n), m = (size_t)t->n_set;
   PetscBLASInt mb, info;
-  PetscReal least = PETSC_MAX_REAL, most = 0;
+  PetscReal least = PETSC_MAX_REAL, most = 0, usual = 0;
 
   PetscFunctionBegin;
   *regular = PETSC_TRUE;
@@ -75,7 +104,10 @@ static PetscErrorCode Factor(HycoTangent t, PetscBool rigid, const PetscReal M[]
         rigid && j < (size_t)t->p ? 0 : PetscAbsReal(M[(size_t)t->set[j] * n + (size_t)t->set[j]]);
 
     t->scale[j] = diagonal > 0 ? 1 / PetscSqrtReal(diagonal) : 0;
+    if (j >= (size_t)t->p) usual = PetscMax(usual, t->scale[j]);
   }
+  /* A contact at a node that a motion alone moves has no flexibility of its own: as the others, so that the motion's row sees it. */
+  for (size_t j = (size_t)t->p; j < m; j++) t->scale[j] = t->scale[j] > 0 ? t->scale[j] : usual;
   for (size_t j = 0; j < m; j++) { /* without a diagonal: by the largest entry of the row, once the others are scaled */
     PetscReal largest = 0;
 
@@ -87,6 +119,8 @@ static PetscErrorCode Factor(HycoTangent t, PetscBool rigid, const PetscReal M[]
     t->scale[j] = largest > 0 ? -1 / largest : -1;
   }
   for (size_t j = 0; j < m; j++) t->scale[j] = PetscAbsReal(t->scale[j]);
+  for (PetscInt j = 0; j < t->p && *regular; j++) *regular = (PetscBool)!IsFree(t, rigid, M, j);
+  if (!*regular) PetscFunctionReturn(PETSC_SUCCESS);
   for (size_t j = 0; j < m; j++) {
     for (size_t i = 0; i < m; i++) {
       /* What M has between rigid motions is round-off. */

@@ -172,6 +172,7 @@ static PetscErrorCode Close(Work *o)
 {
   PetscReal *M, *L, *w, *flexibility, most = 0;
   PetscInt *state;
+  PetscBool more = PETSC_TRUE;
   const size_t n = (size_t)(o->p + o->k);
 
   PetscFunctionBegin;
@@ -190,7 +191,11 @@ static PetscErrorCode Close(Work *o)
   }
   PetscCall(HycoTangentStates(o->k, L, w, o->size, flexibility, state));
   /* Of bodies, whose unknowns are rigid motions, M is 0 there. */
-  PetscCall(HycoTangentCreate(o->p, PETSC_FALSE, o->k, M, state, &o->tangent, &o->regular));
+  for (o->regular = PETSC_FALSE; !o->regular && more;) {
+    PetscCall(HycoTangentDestroy(&o->tangent));
+    PetscCall(HycoTangentCreate(o->p, PETSC_FALSE, o->k, M, state, &o->tangent, &o->regular));
+    if (!o->regular) HycoTangentCloseMore(o->k, L, state, &more);
+  }
   PetscCall(PetscFree4(L, w, flexibility, state));
   PetscCall(PetscFree(M));
   /* A singular matrix means forces that can be redistributed: a derivative of one of many distributions would be

@@ -56,6 +56,7 @@ static PetscErrorCode Close(HycoSolverTangent t, Vec x, Vec L, PetscBool *regula
   const PetscReal *S;
   PetscInt *state;
   const PetscInt n = t->p + t->m;
+  PetscBool more = PETSC_TRUE;
 
   PetscFunctionBegin;
   HycoSolverGetCondensed(t->s, &t->m, &t->p, &S);
@@ -64,7 +65,11 @@ static PetscErrorCode Close(HycoSolverTangent t, Vec x, Vec L, PetscBool *regula
   PetscCall(HycoVecGather(L, force));
   for (PetscInt i = 0; i < t->m; i++) flexibility[i] = S[(size_t)(t->p + i) * (size_t)n + (size_t)(t->p + i)];
   PetscCall(HycoTangentStates(t->m, force, gap, t->size, flexibility, state));
-  PetscCall(HycoTangentCreate(t->p, PETSC_TRUE, t->m, S, state, &t->tangent, regular));
+  for (*regular = PETSC_FALSE; !*regular && more;) {
+    PetscCall(HycoTangentDestroy(&t->tangent));
+    PetscCall(HycoTangentCreate(t->p, PETSC_TRUE, t->m, S, state, &t->tangent, regular));
+    if (!*regular) HycoTangentCloseMore(t->m, force, state, &more);
+  }
   PetscCall(PetscFree4(force, gap, flexibility, state));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
