@@ -319,8 +319,7 @@ PetscErrorCode HycoBodiesAlongNear(HycoROM model, HycoBodiesFriction friction, c
 PetscErrorCode HycoBodiesAlongStep(HycoBodiesFriction friction, PetscInt parameter, const PetscReal weight[3],
                                    const PetscInt point[3], const PetscReal q[], PetscReal dz[], PetscBool *regular);
 /* After the last HycoBodiesAlongStep() of a parameter: its slips and work. */
-PetscErrorCode HycoBodiesAlongTake(HycoBodiesFriction friction, PetscInt parameter, const PetscReal dz[],
-                                   PetscBool *regular);
+void HycoBodiesAlongTake(HycoBodiesFriction friction, PetscInt parameter, const PetscReal dz[]);
 PetscErrorCode HycoBodiesAlongShow(HycoROM model, HycoBodiesFriction friction, PetscInt parameter, PetscBool rows,
                                    PetscReal step, const PetscReal dz[]);
 /* By row. Borrowed. */

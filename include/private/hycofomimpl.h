@@ -11,10 +11,11 @@
 /* The most rigid motions that -hyco_regularise releases. */
 #define HYCO_MAX_PINS 12
 
-/* The arrays of a HycoGradient. */
+/* The arrays of a HycoGradient. most: of a time of a path the largest of each output on it, borrowed; else NULL. */
 typedef struct {
   PetscReal *value;
   PetscBool *kink;
+  const PetscReal *most;
 } HycoGradientStore;
 
 typedef struct _n_HycoPath *HycoPath;

@@ -62,6 +62,8 @@ PetscErrorCode HycoGradientColumn(HycoGradient *gradient, HycoGradientStore *sto
 
 /* -- paths -- */
 
+/* most[n_quantities]: the largest of each output at the listed times, without its sign. */
+void HycoPathLargest(HycoScene scene, const HycoStep step[], PetscReal most[]);
 /* Tolerance of Newton's method on the paths beside a solution. */
 #define HYCO_GRADIENT_RTOL 1e-12
 /* Solves the path at mu in the steps of the solution, as far as its end, without monitors and files; *step: at its n_times

@@ -149,7 +149,11 @@ static PetscErrorCode Rest(const HycoLCP *lcp, const PetscReal before[], const P
   for (PetscInt i = p; i < N; i++) moved = PetscMax(moved, PetscAbsReal(t[i] + dq[i]));
   for (PetscInt i = p; i < N; i++) t[i] = -dq[i];
   Move(lcp, -1, dz, t, t);
-  if (moved > CLOSED * size && n_closed) PetscCall(Fit(lcp, n_closed, closed, t, dx));
+  if (moved > CLOSED * size) {
+    /* What has moved the bodies on would overlap without that, and just touches. */
+    *regular = (PetscBool)(n_closed > 0);
+    if (n_closed) PetscCall(Fit(lcp, n_closed, closed, t, dx));
+  }
   for (PetscInt c = 0; c < p; c++) dz[c] += dx[c];
   Move(lcp, -1, dx, t, t);
   for (PetscInt i = 0; i < n_closed; i++)

@@ -35,7 +35,7 @@ static PetscErrorCode LeastDistance(PetscInt p, PetscInt n, const PetscReal E[],
 PetscErrorCode HycoLCPUnload(PetscInt N, PetscInt p, PetscInt n, const PetscInt row[], const PetscReal M[],
                              const PetscReal q[], PetscReal x[], PetscBool *exists)
 {
-  PetscReal *E, *d, most = 0, least = 0;
+  PetscReal *E, *d, most = 0, least = 0, unit = 0;
 
   PetscFunctionBegin;
   *exists = PETSC_TRUE;
@@ -46,15 +46,20 @@ PetscErrorCode HycoLCPUnload(PetscInt N, PetscInt p, PetscInt n, const PetscInt 
     for (PetscInt i = 0; i < p; i++) {
       column[i] = M[(size_t)i * (size_t)N + (size_t)row[k]];
       w += column[i] * x[i];
+      unit = PetscMax(unit, PetscAbsReal(column[i]));
     }
     column[p] = -w;
     most = PetscMax(most, PetscAbsReal(w));
     least = PetscMin(least, w);
   }
-  /* In units of the largest gap, so that the rows of E are alike. */
-  for (PetscInt k = 0; k < n && least < 0; k++) E[k * (p + 1) + p] /= most;
+  /* In units of the largest gap and of the motion that changes one by as much: both rows of E and d are of size 1, so that
+     r_last does not cancel. */
+  for (PetscInt k = 0; k < n && least < 0; k++) {
+    for (PetscInt i = 0; i < p && unit > 0; i++) E[k * (p + 1) + i] /= unit;
+    E[k * (p + 1) + p] /= most;
+  }
   if (least < 0) PetscCall(LeastDistance(p, n, E, d, exists));
-  for (PetscInt i = 0; i < p && least < 0 && *exists; i++) x[i] += most * d[i];
+  for (PetscInt i = 0; i < p && least < 0 && *exists; i++) x[i] += most / unit * d[i];
   PetscCall(PetscFree2(E, d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -33,9 +33,9 @@ PetscErrorCode HycoAlongShow(HycoAlong along, PetscInt parameter, PetscReal step
 PetscErrorCode HycoAlongEnd(HycoAlong along);
 
 /* The gradient of the present state at f's parameters, in `store` (NULL: its outputs are not wanted); along: of a step that
-   HycoAlongStep() has begun, with the largest of each output on the path (n_quantities); else NULL. *regular false: it has none by the system
+   HycoAlongStep() has begun; else NULL. *regular false: it has none by the system
    of its contacts; not at a point, where that is an error. */
-PetscErrorCode HycoFOMStateGradient(HycoFOM fom, HycoAlong along, const PetscReal most[], HycoGradientStore *store,
-                                    HycoGradient *gradient, PetscBool *regular);
+PetscErrorCode HycoFOMStateGradient(HycoFOM fom, HycoAlong along, HycoGradientStore *store, HycoGradient *gradient,
+                                    PetscBool *regular);
 
 #endif

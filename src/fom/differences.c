@@ -8,6 +8,8 @@
 #define ROUND 1e-9 /* share of a value below which a difference may be round-off */
 #define NOISE                                                                                                          \
   3e-13 /* share of a value below which its change over a step is round-off: as a derivative 1e-8 of it over the range */
+#define NOTHING                                                                                                        \
+  1e-8 /* share of the largest value on a path below which one is round-off, as is a change over the range */
 
 /* For gradients at full order and of models. */
 PetscErrorCode HycoGradientCheckScene(HycoScene s)
@@ -163,6 +165,22 @@ static PetscErrorCode MeasureBeside(PetscInt n, HycoScene scene, const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Outputs that are round-off at a time of a path, as stresses of bodies without loads, have no derivative, and no kink. */
+static void DropRounding(const HycoGradient *g, HycoGradientStore *store, HycoScene s, PetscInt p,
+                         const PetscReal value[])
+{
+  const PetscReal width = s->hi[p] > s->lo[p] ? s->hi[p] - s->lo[p] : 1;
+
+  for (PetscInt q = 0; q < g->n_outputs; q++) {
+    const PetscInt at = q * g->n_parameters + p;
+    const PetscReal least = NOTHING * store->most[q];
+
+    if (PetscAbsReal(value[q]) > least || PetscAbsReal(store->value[at]) * width > least) continue;
+    store->value[at] = 0;
+    store->kink[at] = PETSC_FALSE;
+  }
+}
+
 /* Closer differences only of outputs whose slopes jump: they tell a kink from curvature, and are of one side of a kink that
    lies between their points and the farther ones. */
 PetscErrorCode HycoGradientColumn(HycoGradient *g, HycoGradientStore *store, HycoScene scene, const PetscReal mu[],
@@ -205,11 +223,20 @@ PetscErrorCode HycoGradientColumn(HycoGradient *g, HycoGradientStore *store, Hyc
     for (PetscInt q = n; q < 3 * n; q++) value[q] = closer[q];
     at = near;
   }
+  if (store->most && !kink) DropRounding(g, store, scene, d->parameter, value);
   PetscCall(PetscFree(jump));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* -- paths -- */
+
+void HycoPathLargest(HycoScene s, const HycoStep step[], PetscReal most[])
+{
+  for (PetscInt q = 0; q < s->n_quantities; q++) {
+    most[q] = 0;
+    for (PetscInt k = 0; k < s->n_times; k++) most[q] = PetscMax(most[q], PetscAbsReal(step[k].quantity[q]));
+  }
+}
 
 typedef struct {
   HycoScene scene;

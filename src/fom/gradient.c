@@ -11,12 +11,11 @@
 #include "along.h"
 
 #define CLOSED  1e-7 /* share of the largest gap below which one is closed */
-#define NOTHING 1e-8 /* share of an output's largest value below which it is round-off, as is a change over the range */
+#define NOTHING 1e-8 /* share of the largest change of a gap below which it is round-off */
 
 typedef struct {
   HycoFOM f;
-  HycoAlong along;       /* NULL at a point; else */
-  const PetscReal *most; /* the largest of each output on the path */
+  HycoAlong along; /* NULL at a point */
   HycoGradientStore *store;
   PetscReal mu[HYCO_MAX_PARAMETERS];
   HycoSolverTangent tangent;
@@ -338,22 +337,6 @@ static PetscErrorCode Solve(Work *o, const HycoDifference *d, PetscBool *kink)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Outputs that are round-off at a time of a path, as stresses of bodies without loads, have no derivative, and no kink. */
-static void DropRounding(Work *o, PetscInt p, const HycoGradient *g)
-{
-  const HycoScene s = o->f->scene;
-  const PetscReal width = s->hi[p] > s->lo[p] ? s->hi[p] - s->lo[p] : 1;
-
-  for (PetscInt q = 0; q < g->n_outputs; q++) {
-    const PetscInt at = q * g->n_parameters + p;
-    const PetscReal least = NOTHING * o->most[q];
-
-    if (PetscAbsReal(o->output[q]) > least || PetscAbsReal(o->store->value[at]) * width > least) continue;
-    o->store->value[at] = 0;
-    o->store->kink[at] = PETSC_FALSE;
-  }
-}
-
 /* One column of the gradient. Collective. */
 static PetscErrorCode Column(Work *o, PetscInt p, HycoGradient *gradient)
 {
@@ -374,7 +357,6 @@ static PetscErrorCode Column(Work *o, PetscInt p, HycoGradient *gradient)
   if (o->store)
     PetscCall(HycoGradientColumn(gradient, o->store, o->f->scene, o->mu, &d, (PetscBool)(turns || kink), Measure, o,
                                  o->output));
-  if (o->store && o->most && !turns && !kink) DropRounding(o, p, gradient);
   if (o->along) PetscCall(HycoAlongTake(o->along, o->mu, &d, o->U, o->dU));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -513,10 +495,10 @@ static PetscErrorCode Check(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFOMStateGradient(HycoFOM f, HycoAlong along, const PetscReal most[], HycoGradientStore *store,
-                                    HycoGradient *gradient, PetscBool *regular)
+PetscErrorCode HycoFOMStateGradient(HycoFOM f, HycoAlong along, HycoGradientStore *store, HycoGradient *gradient,
+                                    PetscBool *regular)
 {
-  Work o = {.f = f, .along = along, .most = most, .store = store};
+  Work o = {.f = f, .along = along, .store = store};
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
@@ -544,6 +526,6 @@ PetscErrorCode HycoFOMGetGradient(HycoFOM f, HycoGradient *gradient)
   }
   PetscCall(HycoGradientCreate(f->scene, &f->gradient, gradient));
   /* The model may stand at mu + h: its solution is not to be used. */
-  HycoOnError(HycoFOMStateGradient(f, NULL, NULL, &f->gradient, gradient, &regular), f->solved = PETSC_FALSE);
+  HycoOnError(HycoFOMStateGradient(f, NULL, &f->gradient, gradient, &regular), f->solved = PETSC_FALSE);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

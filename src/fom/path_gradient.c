@@ -68,8 +68,8 @@ typedef struct {
   HycoFOM f;
   HycoAlong along;
   const HycoGradient *gradient;
-  const PetscReal *most; /* the largest of each output on the path */
-  PetscBool done;        /* no step so far lacks them */
+  PetscReal most[HYCO_MAX_QUANTITIES]; /* the largest of each output on the path */
+  PetscBool done;                      /* no step so far lacks them */
 } Again;
 
 /* After an accepted step. Without friction the steps do not depend on each other, and those between the listed times are
@@ -80,13 +80,13 @@ static PetscErrorCode Pass(HycoPath p, PetscReal t0, void *context)
   HycoFOM f = o->f;
   const PetscInt n = o->gradient->n_outputs, np = o->gradient->n_parameters;
   const PetscBool lists = (PetscBool)(p->t == p->scene->times[p->step]);
-  HycoGradientStore there = {f->gradient.value + p->step * n * np, f->gradient.kink + p->step * n * np};
+  HycoGradientStore there = {f->gradient.value + p->step * n * np, f->gradient.kink + p->step * n * np, o->most};
   HycoGradient at = {.n_outputs = n, .n_parameters = np};
 
   PetscFunctionBegin;
   if (!o->done || (!lists && !f->friction)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoAlongStep(o->along, t0, &o->done));
-  if (o->done) PetscCall(HycoFOMStateGradient(f, o->along, o->most, lists ? &there : NULL, &at, &o->done));
+  if (o->done) PetscCall(HycoFOMStateGradient(f, o->along, lists ? &there : NULL, &at, &o->done));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -111,17 +111,12 @@ static PetscErrorCode Fetch(HycoFOM f, const PetscReal mu[])
 static PetscErrorCode BySteps(HycoFOM f, const PetscReal mu[], HycoGradient *gradient, PetscBool *done)
 {
   HycoPath p = f->path;
-  const PetscInt n = f->scene->n_quantities;
   Again o = {.f = f, .gradient = gradient, .done = PETSC_TRUE};
-  PetscReal *most;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoGradientCreate(f->scene, &f->gradient, gradient));
-  PetscCall(PetscCalloc1(n + 1, &most));
-  for (PetscInt k = 0; k < n * p->n_steps; k++)
-    most[k % n] = PetscMax(most[k % n], PetscAbsReal(p->steps[k / n].quantity[k % n]));
-  o.most = most;
+  HycoPathLargest(f->scene, p->steps, o.most);
   ierr = Fetch(f, mu);
   if (!ierr) ierr = HycoAlongCreate(f, &o.along);
   p->passes = Pass;
@@ -130,7 +125,6 @@ static PetscErrorCode BySteps(HycoFOM f, const PetscReal mu[], HycoGradient *gra
   p->passes = NULL;
   *done = (PetscBool)(!ierr && o.done);
   PetscCall(HycoAlongDestroy(&o.along));
-  PetscCall(PetscFree(most));
   PetscCall(ierr);
   if (*done) HycoGradientOfExtremes(f->scene, mu, p->steps, &f->gradient, gradient);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -69,13 +69,15 @@ static PetscErrorCode AtTimes(HycoROM m, const HycoStep step[], HycoGradient *gr
   const PetscInt n = gradient->n_outputs * gradient->n_parameters, n_listed = m->trace.n_listed;
   const PetscBool flows = HycoSceneFlows(m->model->scene),
                   all = (PetscBool)(flows || HycoSceneHasFriction(m->model->scene));
+  PetscReal most[HYCO_MAX_QUANTITIES];
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   *done = PETSC_TRUE;
+  HycoPathLargest(m->model->scene, step, most);
   for (PetscInt k = 0, listed = 0; k < m->trace.n && *done; k++) {
     const PetscBool lists = (PetscBool)(listed < n_listed && m->trace.at[listed] == k);
-    HycoGradientStore there = {m->gradient.value + listed * n, m->gradient.kink + listed * n};
+    HycoGradientStore there = {m->gradient.value + listed * n, m->gradient.kink + listed * n, most};
     HycoGradient at = {.n_outputs = gradient->n_outputs, .n_parameters = gradient->n_parameters};
 
     if (!lists && !all) continue;

@@ -30,9 +30,9 @@ history: {times: [0, 1, 4, 8], tables: {q: [[0, 0.2], [1, 1], [4, 1.1], [8, 0.6]
 """
 REST = """
 scene: {title: a block that friction holds and lets go, mesh: mesh.msh, parameters: [push, pull, rough]}
-parameter: {push: {range: [40, 80]}, pull: {range: [10, 20]}, rough: {range: [0.1, 0.5]}}
+parameter: {push: {range: [40, 80]}, pull: {range: [5, 10]}, rough: {range: [0.3, 0.5]}}
 body: {block: {young: 1e5, poisson: 0.3}}
-pressure: {low: push*q}
+pressure: {low: push*qTRAP}
 traction: {right: {x: pull*s}}
 contact: {wall: {type: obstacle, group: high, normal: {y: 1}, gap: 0, friction: rough}}
 output:
@@ -65,7 +65,7 @@ EDGE = (('gap: -stop*(0.2 + x)', 'gap: stop*(10 + x)'), *YIELD)
 TRAP = ' + 0*sqrt(abs(push - 61.004) - 1e-7)'  # where a difference of whole paths has its point
 STEPS = ('-hyco_substeps', '4', '-hyco_step_inelastic', '1e3', '-hyco_newton_rtol', '1e-13')
 RANGES = {'push': (40, 80), 'stop': (1e-4, 4e-4), 'rate': (5e-10, 2e-9), 'limit': (35, 45), 'rough': (0.1, 0.5), 'ratio': (0.2, 0.4), 'warm': (850, 950), 'pace': (5e-9, 2e-8),
-          'pull': (10, 20)}
+          'pull': (5, 10)}
 WIDTH = 1.6e-4  # of the central differences, as a share of the range
 
 
@@ -88,7 +88,7 @@ class PathGradients(Case):
         time. The path itself is that without gradients."""
         point = {'push': 61.0, 'stop': 2.3e-4}
         for laws, point, along in ((PLAIN, {**point, 'ratio': 0.31}, ('stop', 'ratio')), (RUB, {**point, 'rough': 0.23}, ('push', 'rough')),
-                                   (None, {'push': 61.0, 'pull': 14.0, 'rough': 0.33}, ('pull', 'rough')),
+                                   (None, {'push': 61.0, 'pull': 9.7, 'rough': 0.31}, ('pull', 'rough')),
                                    (YIELD, {**point, 'limit': 39.0}, ('limit',)), (CREEP, {**point, 'rate': 1.1e-9}, ('push', 'rate'))):
             scene = self.write(laws or (), SCENE if laws else REST)
             solve = lambda at, *args, scene=scene: self.hyco('solve', '-scene', scene, *STEPS, '-mu', ','.join(map(repr, at.values())), *args)
@@ -155,13 +155,13 @@ class PathGradients(Case):
                 self.assertFalse(os.path.exists(self.path('none.json')))
 
     def test_models(self):
-        """Models of bodies (elastic without and with friction; yielding; creep alone, with friction, under a body that floats) and hybrid ones, at the end and of the
+        """Models of bodies (elastic without and with friction, which also lets go between; yielding; creep alone, with friction, under a body that floats) and hybrid ones, at the end and of the
         extremes, those of bodies where no path beside has a value; a prediction stays; outputs of a path determine its parameters."""
         for kind, laws, name, mu in (('bodies', PLAIN, 'ratio', 0.31), ('hybrid', CREEP, 'rate', 1.1e-9), ('bodies', RUB, 'rough', 0.23), ('bodies', YIELD, 'limit', 39.0),
-                                     ('bodies', WARM, 'warm', 897.0), ('bodies', FLOAT, 'pace', 1.1e-8), ('bodies', CREEP, 'rate', 1.1e-9)):
+                                     ('bodies', (), 'rest', 0.31), ('bodies', WARM, 'warm', 897.0), ('bodies', FLOAT, 'pace', 1.1e-8), ('bodies', CREEP, 'rate', 1.1e-9)):
             model = f'{kind}_{name}.h5'
-            self.hyco('train', '-scene', self.write(laws, trap=TRAP if kind == 'bodies' else ''), *STEPS, '-hyco_model_type', kind, '-scatter', '6', '-model', model, status=None)
-            point = {'push': 61.0, 'stop': 2.3e-4, name: mu}
+            self.hyco('train', '-scene', self.write(laws, SCENE if laws else REST, TRAP if kind == 'bodies' else ''), *STEPS, '-hyco_model_type', kind, '-scatter', '6', '-model', model, status=None)
+            point = {'push': 61.0, 'stop': 2.3e-4, name: mu} if laws else {'push': 61.0, 'pull': 9.7, 'rough': mu}
             at = ('predict', '-model', model, *STEPS, '-mu', ','.join(map(repr, point.values())))
             report = self.hyco(*at, '-gradient')
             self.assertEqual(report['gradient_kinks'], [])

@@ -1,4 +1,4 @@
-/* Dense linear complementarity: w = q + M z >= 0, z >= 0, w.z = 0, by the active set and by Lemke's method. */
+/* Dense linear complementarity: w = q + M z >= 0, z >= 0, w.z = 0, by the active set and by Lemke's method; motions without forces. */
 #include "check.h"
 #include <hycosolverimpl.h>
 #include <math.h>
@@ -319,9 +319,27 @@ static PetscErrorCode TestThree(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Two planes across each other, and motions in units that change their gaps by little: the nearest place in both. */
+static PetscErrorCode TestUnload(void)
+{
+  const PetscReal unit = 1e-5 / 3, q[4] = {0, 0, -1, -0.5};
+  const PetscReal M[16] = {0, 0, unit, -unit, 0, 0, unit, unit};
+  const PetscInt row[2] = {2, 3};
+  PetscReal x[2] = {0, 0};
+  PetscBool exists;
+
+  PetscFunctionBegin;
+  PetscCall(HycoLCPUnload(4, 2, 2, row, M, q, x, &exists));
+  CHECK(exists, "such a place exists");
+  CHECK_NEAR(unit * x[0], 0.25, 1e-14);
+  CHECK_NEAR(unit * x[1], 0.75, 1e-14);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
+  PetscCall(TestUnload());
   PetscCall(TestFactor());
   PetscCall(TestTwice());
   PetscCall(TestThree());

@@ -1,31 +1,28 @@
 /*
   Derivatives of a path of elastic bodies with friction by its parameters, step by step. With s = B_t U, the slips since the
-  begin, a step has w = (w_n, s_old - s), so that its problem moves by the change of the data and by s_old' of the step before;
-  on its contacts, which are open, stick or slip, the solution follows linearly:
+  begin, a step has w = (w_n, s_old - s), so that its problem moves by the change of the data and by s_old' of the step before.
+  With r' and w' on its contacts' states (cone_tangent.c)
 
-      z' = DP (z' - rho (q' + s_old' + M z')) + g,      s' = s_old' - w_t',      (work)' = -(r_t' . w_t + r_t . w_t')
-
-  g: the change of the coefficient of friction mu' r_n along a slip. DP g = 0, so that z' - g solves the same system with
-  q' + M g. Contacts on the border of two states serve if the derivative keeps them there, as where loads stay.
+      s' = s_old' - w_t',      (work)' = -(r_t' . w_t + r_t . w_t')
 */
 #include "bodies_friction.h"
 #include <hycoentries.h>
+#include <hycolcp.h>
 
-#define CLOSED   1e-7 /* share of the largest force or gap below which a contact may open or close, */
-#define BORDER   1e-9 /* of friction, or of displacements, below which a contact may stick or slip */
-#define CHANGES  1e-7 /* share of the largest rate: less is none */
 #define RETURNED 1e-8 /* share of the forces by which those of the path are found again */
 
 struct _n_HycoBodiesAlong {
   HycoRows rows;            /* beside the path, with tangents, */
   PetscReal *tangent, *mu;  /* 6 n_contacts; 5 x n_contacts: coefficients, by point */
-  PetscReal *none;          /* n_dof: no displacement */
+  PetscReal *none;          /* no displacement, and no forces */
+  const PetscReal *before;  /* by row: the forces before the step. Borrowed */
   PetscReal *old;           /* by row: slips before the step */
   PetscReal *gap;           /* by row: without them */
   PetscReal *slip, *work;   /* by parameter: s' by row; of the work, by contact */
-  PetscReal *g, *q, *w;     /* p + rows */
+  PetscReal *slack;         /* p + rows: of the step; */
+  PetscReal *q, *w;         /* the change of it, at fixed forces and in all */
   PetscReal *force, *spent; /* 3 n_contacts; n_contacts: friction that is shown */
-  PetscReal size, rate;     /* of gaps and displacements; of the change of gaps at fixed forces */
+  PetscReal size;           /* of gaps and displacements */
 };
 
 /* NULL-safe, also where no derivatives have been asked for. */
@@ -36,7 +33,7 @@ PetscErrorCode HycoBodiesAlongDestroy(HycoBodiesFriction f)
   PetscFunctionBegin;
   if (!a) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoRowsDestroy(&a->rows));
-  HycoFreeAll(&a->tangent, &a->mu, &a->none, &a->old, &a->gap, &a->slip, &a->work, &a->g, &a->q, &a->w, &a->force,
+  HycoFreeAll(&a->tangent, &a->mu, &a->none, &a->old, &a->gap, &a->slip, &a->work, &a->slack, &a->q, &a->w, &a->force,
               &a->spent, &f->along);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -54,12 +51,12 @@ static PetscErrorCode Make(HycoBodiesFriction f)
   PetscCall(PetscCalloc1(n + 1, &a->rows.gap));
   PetscCall(PetscMalloc1(6 * f->slip.n + 1, &a->tangent));
   PetscCall(PetscMalloc1(5 * f->slip.n + 1, &a->mu));
-  PetscCall(PetscCalloc1(f->normal.fe->n_dof, &a->none));
+  PetscCall(PetscCalloc1(PetscMax(f->normal.fe->n_dof, n), &a->none));
   PetscCall(PetscMalloc1(n + 1, &a->old));
   PetscCall(PetscMalloc1(n + 1, &a->gap));
   PetscCall(PetscMalloc1(parameters * n + 1, &a->slip));
   PetscCall(PetscMalloc1(parameters * f->slip.n + 1, &a->work));
-  PetscCall(PetscMalloc1(N + 1, &a->g));
+  PetscCall(PetscCalloc1(N + 1, &a->slack));
   PetscCall(PetscMalloc1(N + 1, &a->q));
   PetscCall(PetscMalloc1(N + 1, &a->w));
   PetscCall(PetscMalloc1(3 * f->slip.n + 1, &a->force));
@@ -87,14 +84,33 @@ static void TakeOld(HycoBodiesFriction f)
   }
 }
 
-/* The forces of the path solve the step at once, and give the factor of its states. */
+/* The forces of the path solve the step at once, and give the factor of its states. Without forces a solve would not know
+   where the bodies were before, but the path has their motions. */
+static PetscErrorCode Find(HycoBodiesFriction f, HycoBodiesWork o, const PetscReal taken[], const PetscReal alpha[],
+                           PetscBool *able)
+{
+  const PetscInt N = f->p + f->all.n;
+  PetscReal most = 0;
+  PetscInt its;
+
+  PetscFunctionBegin;
+  for (PetscInt i = f->p; i < N; i++) most = PetscMax(most, PetscAbsReal(taken[i]));
+  PetscCall(PetscArraycpy(f->z, taken, N));
+  if (f->p && most == 0) {
+    if (alpha) PetscCall(HycoBodiesStrain(o, &f->all, alpha));
+    PetscCall(PetscArraycpy(o->x, taken, f->p));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(HycoBodiesFrictionTouch(f, o, 0, alpha, PETSC_TRUE, &its, able));
+  for (PetscInt i = f->p; i < N; i++) *able = (PetscBool)(*able && PetscAbsReal(f->z[i] - taken[i]) <= RETURNED * most);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoBodiesAlongStand(HycoROM m, HycoBodiesFriction f, HycoBodiesWork o, PetscInt k,
                                     const PetscReal alpha[], PetscBool *able)
 {
   const PetscInt n = f->all.n, N = f->p + n, parameters = m->model->scene->n_parameters;
   const PetscReal *taken = f->taken + (size_t)k * (size_t)N;
-  PetscReal most = 0;
-  PetscInt its;
   HycoKKT kkt;
 
   PetscFunctionBegin;
@@ -110,11 +126,10 @@ PetscErrorCode HycoBodiesAlongStand(HycoROM m, HycoBodiesFriction f, HycoBodiesW
     PetscCall(PetscArrayzero(f->along->work, parameters * f->slip.n));
   }
   PetscCall(HycoBodiesFrictionPrepare(f, o, m->fe->mu));
-  PetscCall(PetscArraycpy(f->z, taken, N));
-  PetscCall(HycoBodiesFrictionTouch(f, o, 0, alpha, PETSC_TRUE, &its, able));
-  for (PetscInt i = f->p; i < N; i++) most = PetscMax(most, PetscAbsReal(taken[i]));
-  for (PetscInt i = f->p; i < N; i++) *able = (PetscBool)(*able && PetscAbsReal(f->z[i] - taken[i]) <= RETURNED * most);
+  PetscCall(Find(f, o, taken, alpha, able));
   PetscCall(HycoBodiesFrictionMove(f, o, &kkt));
+  f->along->before = k ? taken - f->all.n : f->along->none;
+  PetscCall(PetscArraycpy(f->along->slack + f->p, f->w, n));
   TakeOld(f);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -175,122 +190,42 @@ PetscErrorCode HycoBodiesAlongNear(HycoROM m, HycoBodiesFriction f, const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the derivative keeps a contact of two states in both: r, w of its rows and their rates; d: of its coefficient. */
-static PetscBool Keeps(HycoBodiesFriction f, PetscInt k, PetscReal most, const PetscReal dr[], const PetscReal dw[],
-                       PetscReal d, PetscReal rate_r, PetscReal rate_w)
-{
-  const PetscInt first = f->slip.row[k], size = f->slip.row[k + 1] - first;
-  const PetscReal *r = f->z + f->p + first, *w = f->w + first, limit = f->slip.mu[k] * r[0];
-  PetscReal force = 0, slip = 0, change = 0, slips = 0;
-
-  if (r[0] <= CLOSED * most && w[0] <= CLOSED * f->along->size)
-    return (PetscBool)(PetscAbsReal(dr[0]) <= CHANGES * rate_r && PetscAbsReal(dw[0]) <= CHANGES * rate_w);
-  if (size == 1 || r[0] <= CLOSED * most) return PETSC_TRUE;
-  for (PetscInt i = 1; i < size; i++) {
-    force += r[i] * r[i];
-    slip += w[i] * w[i];
-    slips += dw[i] * dw[i];
-  }
-  force = PetscSqrtReal(force);
-  if (force < (1 - BORDER) * limit || PetscSqrtReal(slip) > BORDER * f->along->size) return PETSC_TRUE;
-  change = d * r[0] + f->slip.mu[k] * dr[0];
-  for (PetscInt i = 1; i < size && force > 0; i++) change -= r[i] / force * dr[i];
-  return (PetscBool)(PetscAbsReal(change) <= CHANGES * rate_r && PetscSqrtReal(slips) <= CHANGES * rate_w);
-}
-
-/* g of contact k, whose coefficient changes by d: along its slip, where it slips. */
-static void AddFriction(HycoBodiesFriction f, PetscInt k, PetscReal d, PetscReal g[])
-{
-  const PetscInt first = f->slip.row[k], size = f->slip.row[k + 1] - first;
-  const PetscReal *r = f->z + f->p + first, *w = f->w + first, *pieces;
-  PetscReal slip = 0;
-  PetscBool slips = PETSC_FALSE;
-  PetscInt n;
-
-  HycoConeFactorGetPieces(f->factor, &n, &pieces);
-  pieces += (size_t)k * (size_t)(n / f->slip.n);
-  for (PetscInt i = 1; i < size; i++) {
-    slip += w[i] * w[i];
-    slips = (PetscBool)(slips || pieces[i * size] != 0);
-  }
-  slip = PetscSqrtReal(slip);
-  for (PetscInt i = 1; i < size && r[0] > 0; i++) {
-    if (slips) g[first + i] = d * r[0] * pieces[i * size] / f->slip.mu[k];
-    /* Without friction there is no piece of slip: a force against it appears. */
-    if (f->slip.mu[k] == 0 && slip > 0) g[first + i] = -d * r[0] * w[i] / slip;
-  }
-}
-
-/* y += M x */
-static void AddProduct(HycoBodiesFriction f, const PetscReal x[], PetscReal y[])
-{
-  const PetscBLASInt n = (PetscBLASInt)(f->p + f->all.n), each = 1;
-  const PetscReal one = 1;
-
-  if (n) BLASgemv_("N", &n, &n, &one, f->M, &n, x, &each, &one, y, &each);
-}
-
-static PetscReal Largest(PetscInt n, const PetscReal v[])
-{
-  PetscReal most = 0;
-
-  for (PetscInt i = 0; i < n; i++) most = PetscMax(most, PetscAbsReal(v[i]));
-  return most;
-}
-
 /* point[0]: the path itself. */
 PetscErrorCode HycoBodiesAlongStep(HycoBodiesFriction f, PetscInt parameter, const PetscReal weight[3],
                                    const PetscInt point[3], const PetscReal q[], PetscReal dz[], PetscBool *regular)
 {
   HycoBodiesAlong a = f->along;
-  const PetscInt n = f->all.n, p = f->p, N = p + n;
-  const PetscReal *slip = a->slip + parameter * n;
+  const PetscInt n = f->all.n, p = f->p;
+  const HycoLCP lcp = {.n = n, .p = p, .M = f->M, .blocks = f->blocks, .cone = f->factor};
+  PetscReal *dmu = a->mu; /* in place of the path's own */
 
   PetscFunctionBegin;
-  *regular = PETSC_TRUE;
-  PetscCall(PetscArrayzero(a->g, N));
-  PetscCall(PetscArrayzero(dz, N));
-  PetscCall(PetscArraycpy(a->w, q, N));
-  for (PetscInt i = 0; i < n; i++) a->w[p + i] += slip[i];
-  a->rate = Largest(n, a->w + p);
+  PetscCall(PetscArraycpy(a->q, q, p + n));
+  for (PetscInt i = 0; i < n; i++) a->q[p + i] += a->slip[parameter * n + i];
   for (PetscInt k = 0; k < f->slip.n; k++) {
-    PetscReal *d = a->mu + k; /* in place of the path's own */
-
-    *d = weight[0] * f->slip.mu[k];
-    for (PetscInt j = 1; j < 3; j++) *d += weight[j] * a->mu[point[j] * f->slip.n + k];
-    if (PetscAbsReal(*d) > 0) AddFriction(f, k, *d, a->g + p);
+    dmu[k] = weight[0] * f->slip.mu[k];
+    for (PetscInt j = 1; j < 3; j++) dmu[k] += weight[j] * a->mu[point[j] * f->slip.n + k];
   }
-  PetscCall(PetscArraycpy(a->q, a->w, N));
-  if (Largest(N, a->g) > 0) AddProduct(f, a->g, a->q);
-  /* Without loads floating bodies have no place. */
-  if (Largest(N, a->q) > 0) PetscCall(HycoConeFactorTangent(f->factor, 1, a->q, dz, regular));
-  if (!*regular) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt i = 0; i < N; i++) dz[i] += a->g[i];
-  AddProduct(f, dz, a->w);
+  PetscCall(HycoConeTangent(&lcp, a->before, f->z, a->slack, a->size, dmu, a->q, dz, a->w, regular));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoBodiesAlongTake(HycoBodiesFriction f, PetscInt parameter, const PetscReal dz[], PetscBool *regular)
+void HycoBodiesAlongTake(HycoBodiesFriction f, PetscInt parameter, const PetscReal dz[])
 {
   HycoBodiesAlong a = f->along;
   const PetscInt n = f->all.n, p = f->p;
-  const PetscReal most = Largest(n, f->z + p), *r = f->z + p, rate_r = Largest(n, dz + p),
-                  rate_w = PetscMax(a->rate, Largest(n, a->w + p));
+  const PetscReal *r = f->z + p;
   PetscReal *slip = a->slip + parameter * n, *work = a->work + parameter * f->slip.n;
 
-  PetscFunctionBegin;
-  *regular = PETSC_TRUE;
   for (PetscInt k = 0; k < f->slip.n; k++) {
     const PetscInt first = f->slip.row[k];
 
     if (f->rows.start[first] == f->rows.start[first + 1]) continue;
-    *regular = (PetscBool)(*regular && Keeps(f, k, most, dz + p + first, a->w + p + first, a->mu[k], rate_r, rate_w));
     for (PetscInt i = first + 1; i < f->slip.row[k + 1]; i++) {
       if (r[first] > 0) work[k] -= dz[p + i] * f->w[i] + r[i] * a->w[p + i];
       slip[i] -= a->w[p + i];
     }
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoBodiesAlongShow(HycoROM m, HycoBodiesFriction f, PetscInt parameter, PetscBool rows, PetscReal step,

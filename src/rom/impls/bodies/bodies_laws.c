@@ -316,8 +316,9 @@ PetscErrorCode HycoBodiesLawsAlong(HycoROM m, PetscInt parameter, const PetscRea
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(o->dalpha, w->bodies.bodies->inelastic->m));
   PetscCall(PetscArraycpy(o->q, q, w->bodies.bodies->p + w->surface.n));
+  /* Whether the contacts keep their states is not yet known. */
   PetscCall(Respond(m, parameter, weight, point, o->q, dz, regular));
-  if (*regular && w->n_rows) {
+  if (w->n_rows && (*regular || w->friction)) {
     /* Beside the step it was elsewhere. */
     PetscCall(HycoFESetParameters(o->fe, w->bodies.mu));
     PetscCall(HycoFEKeepGradients(o->fe));
@@ -329,7 +330,7 @@ PetscErrorCode HycoBodiesLawsAlong(HycoROM m, PetscInt parameter, const PetscRea
   }
   *regular = (PetscBool)(*regular && smooth);
   if (*regular && w->friction)
-    PetscCall(HycoBodiesAlongTake(w->friction, parameter, dz, regular));
+    HycoBodiesAlongTake(w->friction, parameter, dz);
   else if (*regular)
     *regular = Stays(m, o->q, dz);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -365,7 +365,7 @@ static PetscErrorCode Along(HycoROM m, PetscInt parameter, const PetscReal weigh
     PetscCall(HycoBodiesLawsAlong(m, parameter, weight, point, q, dz, regular));
   else
     PetscCall(HycoBodiesAlongStep(o->friction, parameter, weight, point, q, dz, regular));
-  if (*regular && !o->path->flows) PetscCall(HycoBodiesAlongTake(o->friction, parameter, dz, regular));
+  if (*regular && !o->path->flows) HycoBodiesAlongTake(o->friction, parameter, dz);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
