@@ -1171,7 +1171,7 @@ static void SetRanges(HycoScene s)
 }
 
 /* What the stresses lose: of the values that are elastic ones. The unit of alpha: strains of it are of the size of those of loads
-   at the end of the path. */
+   and forces; a support that moves a body as a whole gives none alone. */
 static PetscErrorCode ScaleAlpha(Export *e)
 {
   PetscReal *mu, *z, *y, *more, size[2] = {0, 0};
@@ -1186,12 +1186,14 @@ static PetscErrorCode ScaleAlpha(Export *e)
   PetscCall(Scatter(e, 1, &mu));
   PetscCall(PetscCalloc3(e->p + e->k + e->l, &z, e->ny, &y, e->ny, &more));
   PetscCall(Probe(e, mu, z, y));
-  for (PetscInt i = 0; i < e->l; i++) z[e->p + e->k + i] = 1;
-  PetscCall(Probe(e, mu, z, more));
-  for (PetscInt i = e->p + e->k; i < e->ny; i++) {
-    if (e->row[i - e->p - e->k].from != STRAIN) continue;
-    size[0] = PetscMax(size[0], PetscAbsReal(y[i]));
-    size[1] = PetscMax(size[1], PetscAbsReal(more[i] - y[i]));
+  for (PetscInt part = 0; part < 2; part++) { /* forces, then alpha */
+    for (PetscInt i = e->p; i < e->p + e->k + e->l; i++) z[i] = (i >= e->p + e->k) == part;
+    PetscCall(Probe(e, mu, z, more));
+    for (PetscInt i = e->p + e->k; i < e->ny; i++) {
+      if (e->row[i - e->p - e->k].from != STRAIN) continue;
+      size[part] = PetscMax(size[part], PetscAbsReal(more[i] - y[i]));
+      size[0] = PetscMax(size[0], PetscAbsReal(y[i]));
+    }
   }
   if (size[0] > 0 && size[1] > 0) e->unit[2] = size[0] / size[1];
   PetscCall(PetscFree3(z, y, more));
