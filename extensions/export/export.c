@@ -1040,8 +1040,9 @@ static PetscErrorCode Fill(Export *e)
 
 /* -- comparison with the model -- */
 
-/* The model's results in the order of the outputs, as above. *solved: its problem is. */
-static PetscErrorCode RunModel(Export *e, const PetscReal mu[], PetscInt j, PetscReal out[], PetscBool *solved)
+/* The model's results in the order of the outputs, as above. *solved: its problem is; *loose: contact leaves a motion free. */
+static PetscErrorCode RunModel(Export *e, const PetscReal mu[], PetscInt j, PetscReal out[], PetscBool *solved,
+                               PetscBool *loose)
 {
   const HycoContactResult *result;
   HycoPrediction prediction;
@@ -1053,6 +1054,7 @@ static PetscErrorCode RunModel(Export *e, const PetscReal mu[], PetscInt j, Pets
   if (!j) PetscCall(HycoROMPredict(e->m, e->s->n_parameters, mu));
   PetscCall(HycoROMGetPrediction(e->m, &prediction));
   *solved = (PetscBool)(prediction.reason > 0);
+  *loose = prediction.loose;
   if (e->s->n_times) PetscCall(HycoROMGetHistory(e->m, &history));
   if (e->s->n_times) *solved = (PetscBool)(*solved || j + 1 < history.n);
   if (e->s->n_times && !*solved) PetscFunctionReturn(PETSC_SUCCESS);
@@ -1106,7 +1108,7 @@ static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
   HycoSamples samples;
   const PetscReal *mu;
   PetscReal *mine, *theirs, *most, *worst;
-  PetscBool solved = PETSC_TRUE, theirs_solved = PETSC_TRUE;
+  PetscBool solved = PETSC_TRUE, theirs_solved = PETSC_TRUE, loose = PETSC_FALSE;
   PetscInt points;
   clock_t begin;
   Work o;
@@ -1122,13 +1124,17 @@ static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
     const PetscReal *at = mu + i / times * e->s->n_parameters;
 
     if (i % times && !solved) continue; /* a path that has ended */
-    PetscCall(RunModel(e, at, i % times, theirs, &theirs_solved));
+    PetscCall(RunModel(e, at, i % times, theirs, &theirs_solved, &loose));
     begin = clock();
     if (i % times == 0) PetscCall(PetscArrayzero(e->state, state_size(model)));
     solved = (PetscBool)(advance(model, &o, at, e->s->n_times ? e->s->times[i % times] : 0, e->state, mine, &kkt,
                                  &its) == OK);
     e->out.seconds += (PetscReal)(clock() - begin) / CLOCKS_PER_SEC;
     e->out.checked++;
+    HycoCheck(
+        solved || !theirs_solved || !loose,
+        "export: at a point of the ranges contact leaves a motion of a body free, and a program does not find the "
+        "least one; choose ranges in which contact or friction holds all bodies");
     HycoCheck(
         solved == theirs_solved,
         "export: at a point the program's problem has %s solution, unlike the model's; the forces may not be unique",

@@ -176,6 +176,16 @@ history: {times: [0, 1, 2, 3, 4], tables: {v: [[0, 0], [1, 1], [2, 0.2], [3, 1.1
 output: {P: {max: contact_pressure}, peak: {max: mises, group: top}, R: {reaction: y, group: top}, first: {min: sigma_xx, group: block}}
 """
 
+# nothing but friction holds it along x, and its coefficient may be 0
+FREE = """
+scene: {mesh: held.msh, parameters: [mu]}
+parameter: {mu: {range: [0, 0.3]}}
+body: {block: {young: 1000, poisson: 0.3}}
+traction: {top: {y: -v}}
+contact: {plane: {group: base, normal: {y: -1}, gap: 0, friction: mu}}
+history: {times: [0, 1], tables: {v: [[0, 0], [1, 1]]}}
+"""
+
 
 def grids(folder):
     """The meshes of HELD, ROUND."""
@@ -404,7 +414,10 @@ class Export(Case):
         with open(self.path('flows.yaml'), 'w', encoding='ascii') as f:
             f.write(HELD.replace('young: 1000/soft', 'law: norton, young: 1000, rate: 1e-4*soft, exponent: 2').replace('times: [0, 1, 2, 3, 4, 5]', 'times: [0, 0.5, 1]'))
         self.hyco('train', '-scene', 'flows.yaml', '-hyco_model_type', 'bodies', '-scatter', '2', '-hyco_validation', '0', '-model', 'flows.h5', '-hyco_snapshots', 'flows')
-        for words, args in ((('block', 'creeps', 'shape'), ('-model', 'flows.h5', '-c', 'no.c')), (('under', 'gap', 'travel'), ('-model', 'given.h5', '-c', 'no.c')),
+        with open(self.path('free.yaml'), 'w', encoding='ascii') as f:
+            f.write(FREE)
+        self.hyco('train', '-scene', 'free.yaml', '-hyco_model_type', 'bodies', '-scatter', '2', '-hyco_validation', '0', '-model', 'free.h5')
+        for words, args in ((('motion', 'free', 'ranges'), ('-model', 'free.h5', '-c', 'no.c')), (('block', 'creeps', 'shape'), ('-model', 'flows.h5', '-c', 'no.c')), (('under', 'gap', 'travel'), ('-model', 'given.h5', '-c', 'no.c')),
                             (('hybrid', 'bodies'), ('-model', 'hybrid.h5', '-c', 'no.c')), (('-c', '.c'), ('-model', 'given.h5', '-c', 'no.txt')),
                             (('-c',), ('-model', 'given.h5'))):
             run = self.run_raw('export', *args)
