@@ -1040,8 +1040,9 @@ static PetscErrorCode Fill(Export *e)
 
 /* -- comparison with the model -- */
 
-/* The model's results in the order of the outputs, as above. *solved: its problem is. */
-static PetscErrorCode RunModel(Export *e, const PetscReal mu[], PetscInt j, PetscReal out[], PetscBool *solved)
+/* The model's results in the order of the outputs, as above. *solved: its problem is; *loose: contact leaves a motion free. */
+static PetscErrorCode RunModel(Export *e, const PetscReal mu[], PetscInt j, PetscReal out[], PetscBool *solved,
+                               PetscBool *loose)
 {
   const HycoContactResult *result;
   HycoPrediction prediction;
@@ -1053,6 +1054,7 @@ static PetscErrorCode RunModel(Export *e, const PetscReal mu[], PetscInt j, Pets
   if (!j) PetscCall(HycoROMPredict(e->m, e->s->n_parameters, mu));
   PetscCall(HycoROMGetPrediction(e->m, &prediction));
   *solved = (PetscBool)(prediction.reason > 0);
+  *loose = prediction.loose;
   if (e->s->n_times) PetscCall(HycoROMGetHistory(e->m, &history));
   if (e->s->n_times) *solved = (PetscBool)(*solved || j + 1 < history.n);
   if (e->s->n_times && !*solved) PetscFunctionReturn(PETSC_SUCCESS);
@@ -1106,7 +1108,7 @@ static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
   HycoSamples samples;
   const PetscReal *mu;
   PetscReal *mine, *theirs, *most, *worst;
-  PetscBool solved = PETSC_TRUE, theirs_solved = PETSC_TRUE;
+  PetscBool solved = PETSC_TRUE, theirs_solved = PETSC_TRUE, loose = PETSC_FALSE;
   PetscInt points;
   clock_t begin;
   Work o;
@@ -1122,13 +1124,17 @@ static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
     const PetscReal *at = mu + i / times * e->s->n_parameters;
 
     if (i % times && !solved) continue; /* a path that has ended */
-    PetscCall(RunModel(e, at, i % times, theirs, &theirs_solved));
+    PetscCall(RunModel(e, at, i % times, theirs, &theirs_solved, &loose));
     begin = clock();
     if (i % times == 0) PetscCall(PetscArrayzero(e->state, state_size(model)));
     solved = (PetscBool)(advance(model, &o, at, e->s->n_times ? e->s->times[i % times] : 0, e->state, mine, &kkt,
                                  &its) == OK);
     e->out.seconds += (PetscReal)(clock() - begin) / CLOCKS_PER_SEC;
     e->out.checked++;
+    HycoCheck(
+        solved || !theirs_solved || !loose,
+        "export: at a point of the ranges contact leaves a motion of a body free, and a program does not find the "
+        "least one; choose ranges in which contact or friction holds all bodies");
     HycoCheck(
         solved == theirs_solved,
         "export: at a point the program's problem has %s solution, unlike the model's; the forces may not be unique",
@@ -1171,7 +1177,7 @@ static void SetRanges(HycoScene s)
 }
 
 /* What the stresses lose: of the values that are elastic ones. The unit of alpha: strains of it are of the size of those of loads
-   at the end of the path. */
+   and forces; a support that moves a body as a whole gives none alone. */
 static PetscErrorCode ScaleAlpha(Export *e)
 {
   PetscReal *mu, *z, *y, *more, size[2] = {0, 0};
@@ -1186,12 +1192,14 @@ static PetscErrorCode ScaleAlpha(Export *e)
   PetscCall(Scatter(e, 1, &mu));
   PetscCall(PetscCalloc3(e->p + e->k + e->l, &z, e->ny, &y, e->ny, &more));
   PetscCall(Probe(e, mu, z, y));
-  for (PetscInt i = 0; i < e->l; i++) z[e->p + e->k + i] = 1;
-  PetscCall(Probe(e, mu, z, more));
-  for (PetscInt i = e->p + e->k; i < e->ny; i++) {
-    if (e->row[i - e->p - e->k].from != STRAIN) continue;
-    size[0] = PetscMax(size[0], PetscAbsReal(y[i]));
-    size[1] = PetscMax(size[1], PetscAbsReal(more[i] - y[i]));
+  for (PetscInt part = 0; part < 2; part++) { /* forces, then alpha */
+    for (PetscInt i = e->p; i < e->p + e->k + e->l; i++) z[i] = (i >= e->p + e->k) == part;
+    PetscCall(Probe(e, mu, z, more));
+    for (PetscInt i = e->p + e->k; i < e->ny; i++) {
+      if (e->row[i - e->p - e->k].from != STRAIN) continue;
+      size[part] = PetscMax(size[part], PetscAbsReal(more[i] - y[i]));
+      size[0] = PetscMax(size[0], PetscAbsReal(y[i]));
+    }
   }
   if (size[0] > 0 && size[1] > 0) e->unit[2] = size[0] / size[1];
   PetscCall(PetscFree3(z, y, more));

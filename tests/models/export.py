@@ -160,20 +160,30 @@ body:
   low: {law: limback_andersson, young: 8e4, poisson: 0.3, temperature: "640+4*q*min(t, 1)+5*x", reference_temperature: 293, expansion: 5e-6}
   high: {law: strain_hardening, young: 2e5-50*temperature, poisson: 0.3, temperature: 600+q, rate: 1e-9, exponent: 2, time_exponent: 0.4}
 fixed: {base: {x: 0, y: 0, z: 0}, top: {x: 0, y: 0, z: "-0.001*push*r"}}
+traction: {back: {x: 3*q*r}}
 contact: {joint: {type: surface, slave: face, master: back, friction: 0.3}}
 history: {times: [0, 1, 10, 50, 60], tables: {r: [[0, 1], [1, 2], [50, 2], [60, 0.5]]}}
 output: {S: {max: mises, group: back}, M: {mean: sigma_zz, group: back}, R: {reaction: x, group: top}, W: {friction: work}}
 """
-# 2D, without: yield, unloading and yield again
+# 2D, without: yield, unloading and yield again, under a support that moves the block as a whole, which strains nothing alone
 YIELDING = """
 scene: {mesh: held.msh, parameters: [press, soft]}
 parameter: {press: {range: [1, 2]}, soft: {range: [0.8, 1.2]}}
 body: {block: {law: j2, young: 1000, poisson: 0.3, yield: 0.9*soft + 0.1*y, hardening: 50}}
-fixed: {side: {x: 0}}
-traction: {top: {x: 0.1*press*v, y: -press*v}}
+fixed: {side: {x: 0}, top: {y: -0.001*press*v}}
 contact: {plane: {group: base, normal: {y: -1}, gap: "0.0001*(x - 1)^2"}}
 history: {times: [0, 1, 2, 3, 4], tables: {v: [[0, 0], [1, 1], [2, 0.2], [3, 1.1], [4, 0]]}}
-output: {P: {max: contact_pressure}, peak: {max: mises, group: top}, R: {reaction: x, group: side}, first: {min: sigma_xx, group: block}}
+output: {P: {max: contact_pressure}, peak: {max: mises, group: top}, R: {reaction: y, group: top}, first: {min: sigma_xx, group: block}}
+"""
+
+# nothing but friction holds it along x, and its coefficient may be 0
+FREE = """
+scene: {mesh: held.msh, parameters: [mu]}
+parameter: {mu: {range: [0, 0.3]}}
+body: {block: {young: 1000, poisson: 0.3}}
+traction: {top: {y: -v}}
+contact: {plane: {group: base, normal: {y: -1}, gap: 0, friction: mu}}
+history: {times: [0, 1], tables: {v: [[0, 0], [1, 1]]}}
 """
 
 
@@ -404,7 +414,10 @@ class Export(Case):
         with open(self.path('flows.yaml'), 'w', encoding='ascii') as f:
             f.write(HELD.replace('young: 1000/soft', 'law: norton, young: 1000, rate: 1e-4*soft, exponent: 2').replace('times: [0, 1, 2, 3, 4, 5]', 'times: [0, 0.5, 1]'))
         self.hyco('train', '-scene', 'flows.yaml', '-hyco_model_type', 'bodies', '-scatter', '2', '-hyco_validation', '0', '-model', 'flows.h5', '-hyco_snapshots', 'flows')
-        for words, args in ((('block', 'creeps', 'shape'), ('-model', 'flows.h5', '-c', 'no.c')), (('under', 'gap', 'travel'), ('-model', 'given.h5', '-c', 'no.c')),
+        with open(self.path('free.yaml'), 'w', encoding='ascii') as f:
+            f.write(FREE)
+        self.hyco('train', '-scene', 'free.yaml', '-hyco_model_type', 'bodies', '-scatter', '2', '-hyco_validation', '0', '-model', 'free.h5')
+        for words, args in ((('motion', 'free', 'ranges'), ('-model', 'free.h5', '-c', 'no.c')), (('block', 'creeps', 'shape'), ('-model', 'flows.h5', '-c', 'no.c')), (('under', 'gap', 'travel'), ('-model', 'given.h5', '-c', 'no.c')),
                             (('hybrid', 'bodies'), ('-model', 'hybrid.h5', '-c', 'no.c')), (('-c', '.c'), ('-model', 'given.h5', '-c', 'no.txt')),
                             (('-c',), ('-model', 'given.h5'))):
             run = self.run_raw('export', *args)
