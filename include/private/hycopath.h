@@ -152,6 +152,9 @@ PetscErrorCode HycoPathBegin(HycoPath path, const PetscReal mu[]);
 PetscErrorCode HycoPathRun(HycoPath path);
 /* One attempt, from the accepted state at t0 to t1: U, Lambda and the state `end`. Collective. */
 PetscErrorCode HycoPathAttempt(HycoPath path, PetscReal t0, PetscReal t1, HycoStepAttempt *attempt);
+/* Solves the contact system of the accepted step with K as it stands; U and Lambda stay, which are its solution.
+   Collective. */
+PetscErrorCode HycoPathSolveAgain(HycoPath path, PetscBool *solved);
 /* Restores U and Lambda of the last accepted time. */
 PetscErrorCode HycoPathRestore(HycoPath path);
 /* Updates everything except the solution to t. Collective. */

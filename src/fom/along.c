@@ -1,10 +1,16 @@
 /*
   What the steps of a path hand on of their derivatives by the parameters. Elastic bodies have no memory but that of their
   contacts with friction: the slips of a step count from the surfaces' places at its begin, whose derivatives are those of
-  the step before.
+  the step before. Laws that flow count from their states at its begin. With K = d f_int / dU at the end of the step, the
+  derivatives of f_int at fixed U, of the states and of the stresses are differences of the laws at points beside the
+  parameters, from states that are moved along their derivatives.
 */
 #include "along.h"
 #include <hycoentries.h>
+#include <hycomaterialimpl.h>
+
+#define JUMP                                                                                                           \
+  1e-3 /* share of the largest slope of a stress by which those to the two sides differ, if it is no curvature */
 
 struct _n_HycoAlong {
   HycoFOM f;
@@ -18,7 +24,38 @@ struct _n_HycoAlong {
   PetscReal *force, *spent; /* 3 pairs.n, pairs.n: friction that is shown */
   HycoShear shear;
   HycoFEState state; /* room for one beside the path's */
+  /* with laws that flow: */
+  HycoFEState before, accepted;   /* a step's begin beside the path; the path's state while another is shown */
+  PetscInt n_values, n_tangents;  /* of a state; of fe's tangents */
+  PetscReal *dstate0, *dstate;    /* n_values for each parameter: the derivatives at the begin, at the end */
+  PetscReal *value[2], *tangents; /* states at the two points; what the path had, as K */
+  PetscReal size;                 /* of stresses */
+  PetscBool failed;               /* a law, beside the path */
+  Mat K;
+  Vec f_int, f_path; /* of the state that is shown; that of the path */
 };
+
+/* Room for the laws' states. The path that is solved again stands at the end of the one before. */
+static PetscErrorCode CreateStates(HycoAlong a)
+{
+  const HycoPath p = a->f->path;
+  const HycoFE fe = p->fe;
+  const PetscInt n_cells = fe->mesh->n_cells, nq = HycoElementGet(fe->mesh->type)->nq;
+  const PetscInt np = a->f->scene->n_parameters, *start;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFEStateCreate(fe, &a->before));
+  PetscCall(HycoFEStateGet(a->before, &start, NULL));
+  a->n_values = start[n_cells];
+  if (n_cells) a->n_tangents = fe->tangent_start[n_cells - 1] + nq * fe->tangent_size[fe->mesh->cell_body[n_cells - 1]];
+  PetscCall(PetscCalloc1((size_t)np * (size_t)a->n_values + 1, &a->dstate0));
+  PetscCall(PetscMalloc1((size_t)np * (size_t)a->n_values + 1, &a->dstate));
+  for (PetscInt j = 0; j < 2; j++) PetscCall(PetscMalloc1(a->n_values + 1, &a->value[j]));
+  PetscCall(PetscMalloc1(a->n_tangents + 1, &a->tangents));
+  PetscCall(VecDuplicate(a->f->U, &a->f_int));
+  for (PetscInt k = 0; k < p->n_steps; k++) a->size = PetscMax(a->size, p->steps[k].mises);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 PetscErrorCode HycoAlongCreate(HycoFOM f, HycoAlong *along)
 {
@@ -29,6 +66,7 @@ PetscErrorCode HycoAlongCreate(HycoFOM f, HycoAlong *along)
   PetscCall(PetscNew(along));
   a = *along;
   a->f = f;
+  if (f->path->flows) PetscCall(CreateStates(a));
   if (!f->friction) PetscFunctionReturn(PETSC_SUCCESS);
   a->n_dof = f->fe_surface->n_dof;
   PetscCall(PetscCalloc1(a->n_dof + 1, &a->u_old));
@@ -45,7 +83,14 @@ PetscErrorCode HycoAlongCreate(HycoFOM f, HycoAlong *along)
 /* Outputs are those of the path again. */
 static void ShowPath(HycoAlong a)
 {
-  a->f->path->beside = a->f->fe->heat_is_load = PETSC_FALSE;
+  HycoPath p = a->f->path;
+
+  p->beside = a->f->fe->heat_is_load = PETSC_FALSE;
+  if (a->accepted) {
+    p->begin = a->accepted;
+    p->f_old = a->f_path;
+    a->accepted = NULL;
+  }
   if (a->f->friction) a->f->pairs.shear = &HycoFrictionSlip(a->f->friction)->shear;
 }
 
@@ -58,7 +103,88 @@ PetscErrorCode HycoAlongDestroy(HycoAlong *along)
   if (!a) PetscFunctionReturn(PETSC_SUCCESS);
   ShowPath(a);
   PetscCall(HycoFEStateDestroy(&a->state));
+  PetscCall(HycoFEStateDestroy(&a->before));
+  HycoDestroyAll(&a->K, &a->f_int);
+  HycoFreeAll(&a->dstate0, &a->dstate, &a->value[0], &a->value[1], &a->tangents);
   HycoFreeAll(&a->u_old, &a->moved, &a->du_old, &a->du, &a->work, &a->tangent, &a->force, &a->spent, along);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The derivatives need a tangent that is exact, as those of the laws which have derivatives themselves. */
+static PetscBool Able(HycoScene s)
+{
+  for (PetscInt b = 0; b < s->n_bodies; b++) {
+    if (!s->body[b].law->linear && !s->body[b].law->slopes) return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
+}
+
+/* The laws from the begin of the step, moved by step along its derivative, to u; f_int in the path's f_local. The path
+   exchanges its states when it accepts a step: the one at its begin is now the room of the next end. Not collective. */
+static PetscErrorCode RunLaws(HycoAlong a, PetscInt parameter, PetscReal step, PetscReal u[], PetscBool tangent)
+{
+  const HycoPath p = a->f->path;
+  const HycoFE fe = p->fe;
+  HycoFEState begin = p->end;
+  HycoFEStepReport report;
+
+  PetscFunctionBegin;
+  if (!a->state) PetscCall(HycoFEStateCreate(fe, &a->state));
+  for (PetscInt k = 0; k < fe->n_dof; k++) u[k] = fe->fixed[k] ? fe->u0[k] : u[k];
+  HycoFEComplete(fe, u);
+  if (p->flows && step != 0) {
+    const PetscReal *slope = a->dstate0 + (size_t)parameter * (size_t)a->n_values;
+    PetscReal *from, *to;
+
+    PetscCall(HycoFEStateGet(begin, NULL, &from));
+    PetscCall(HycoFEStateGet(a->before, NULL, &to));
+    for (PetscInt i = 0; i < a->n_values; i++) to[i] = from[i] + step * slope[i];
+    begin = a->before;
+  }
+  PetscCall(PetscArrayzero(p->f_local, fe->n_dof));
+  PetscCall(HycoFEStep(fe, u, a->t0, p->t, begin, a->state, p->f_local, tangent, &report));
+  a->failed = (PetscBool)(a->failed || report.failed);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same to U, whose fixed unknowns follow the parameters. Collective. */
+static PetscErrorCode RunTo(HycoAlong a, PetscInt parameter, PetscReal step, Vec U, PetscBool tangent)
+{
+  PetscReal *u;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(a->f->fe->n_dof, &u));
+  PetscCall(HycoFOMToLocal(a->f, U, u));
+  HycoOnEach(HycoComm(a->f), RunLaws(a, parameter, step, u, tangent));
+  PetscCall(PetscFree(u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* K = d f_int / dU at the end of the step; what the path had is kept, so that it goes on with it. Collective. */
+static PetscErrorCode StandOnTangent(HycoAlong a, PetscBool *able)
+{
+  const HycoPath p = a->f->path;
+
+  PetscFunctionBegin;
+  a->failed = PETSC_FALSE;
+  if (!a->K) PetscCall(MatDuplicate(p->K, MAT_DO_NOT_COPY_VALUES, &a->K));
+  PetscCall(MatCopy(p->K, a->K, SAME_NONZERO_PATTERN));
+  PetscCall(PetscArraycpy(a->tangents, p->fe->tangent, a->n_tangents));
+  PetscCall(RunTo(a, 0, 0, p->U, PETSC_TRUE));
+  PetscCall((*p->ops->stiffness)(p));
+  /* The pieces of friction are those of a solution. */
+  if (p->rubs) PetscCall(HycoPathSolveAgain(p, able));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The path has its own K again. */
+static PetscErrorCode LeaveTangent(HycoAlong a)
+{
+  const HycoPath p = a->f->path;
+
+  PetscFunctionBegin;
+  PetscCall(MatCopy(a->K, p->K, SAME_NONZERO_PATTERN));
+  PetscCall(PetscArraycpy(p->fe->tangent, a->tangents, a->n_tangents));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -71,8 +197,12 @@ PetscErrorCode HycoAlongStep(HycoAlong a, PetscReal t0, PetscBool *able)
   a->t0 = t0;
   a->rubs = p->rubs;
   if (a->f->friction) PetscCall(HycoFrictionMoves(a->f, &moves));
-  *able = (PetscBool)(!moves && !p->solver->iterative);
-  a->f->path->beside = a->f->fe->heat_is_load = *able;
+  *able = (PetscBool)(!moves && !p->solver->iterative && Able(p->scene));
+  if (*able && p->flows) {
+    PetscCall(StandOnTangent(a, able));
+    if (!*able) PetscCall(LeaveTangent(a));
+  } else
+    p->beside = p->fe->heat_is_load = *able;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -81,36 +211,25 @@ PetscBool HycoAlongRubs(HycoAlong a)
   return a->rubs;
 }
 
-/* f_int by the points of the cells, for a tenth of the work of their stiffnesses. The path exchanges its states when it
-   accepts a step: the one at its begin is now the room of the next end. */
-static PetscErrorCode AddInternal(HycoAlong a, PetscReal u[], PetscReal r[])
+PetscBool HycoAlongFlows(HycoAlong a)
 {
-  const HycoPath p = a->f->path;
-  const HycoFE fe = p->fe;
-  HycoFEStepReport report;
-
-  PetscFunctionBegin;
-  if (!a->state) PetscCall(HycoFEStateCreate(fe, &a->state));
-  for (PetscInt k = 0; k < fe->n_dof; k++) u[k] = fe->fixed[k] ? fe->u0[k] : u[k];
-  HycoFEComplete(fe, u);
-  PetscCall(PetscArrayzero(p->f_local, fe->n_dof));
-  PetscCall(HycoFEStep(fe, u, a->t0, p->t, p->end, a->state, p->f_local, PETSC_FALSE, &report));
-  for (PetscInt k = 0; k < fe->n_dof; k++) r[k] += p->f_local[k];
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return a->f->path->flows;
 }
 
-PetscErrorCode HycoAlongImbalance(HycoAlong a, PetscReal u[], PetscReal r[])
+/* f_int by the points of the cells, for a tenth of the work of their stiffnesses. */
+PetscErrorCode HycoAlongImbalance(HycoAlong a, PetscInt parameter, PetscReal step, PetscReal u[], PetscReal r[])
 {
   const HycoFE fe = a->f->fe;
+  const PetscReal *f_int = a->f->path->f_local;
+  const PetscBool heat = fe->heat_is_load;
 
   PetscFunctionBegin;
   fe->heat_is_load = PETSC_FALSE; /* f_int has it */
   PetscCall(HycoFELoads(fe, r));
-  fe->heat_is_load = PETSC_TRUE;
+  fe->heat_is_load = heat;
   HycoFEGeneralise(fe, r);
-  for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = -r[k];
-  PetscCall(AddInternal(a, u, r));
-  for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = fe->fixed[k] ? 0 : r[k];
+  PetscCall(RunLaws(a, parameter, step, u, PETSC_FALSE));
+  for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = fe->fixed[k] ? 0 : f_int[k] - r[k];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -177,7 +296,61 @@ static PetscErrorCode Place(HycoAlong a, Vec U, PetscReal u[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoAlongTake(HycoAlong a, const PetscReal mu[], const HycoDifference *d, Vec U, Vec dU)
+/* The largest of the stresses' slopes, and of their jumps between the two sides, of this rank: v are the states at the
+   parameters and at the points beside them. */
+static void MeasureJumps(HycoAlong a, const HycoDifference *d, PetscReal *const v[3], PetscReal most[2])
+{
+  const HycoFE fe = a->f->fe;
+  const PetscInt nq = HycoElementGet(fe->mesh->type)->nq, ns = fe->n_sigma, *start;
+  const PetscReal *slope = a->dstate + (size_t)d->parameter * (size_t)a->n_values;
+
+  PetscCallAbort(PETSC_COMM_SELF, HycoFEStateGet(a->state, &start, NULL));
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+    const PetscInt width = (start[e + 1] - start[e]) / nq;
+
+    for (PetscInt k = 0; k < nq * ns; k++) {
+      /* A point's state begins with strain and stress (inelastic.c). */
+      const PetscInt i = start[e] + k / ns * width + ns + k % ns;
+      const PetscReal s[3] = {v[0][i], v[1][i], v[2][i]};
+
+      most[0] = PetscMax(most[0], PetscAbsReal(slope[i]));
+      most[1] = PetscMax(most[1], HycoDifferenceJump(d, a->size, PETSC_SMALL, s));
+    }
+  }
+}
+
+/* The derivatives of the states at the end of the step, of U + step dU. */
+static PetscErrorCode TakeStates(HycoAlong a, const PetscReal mu[], const HycoDifference *d, Vec U, Vec dU,
+                                 PetscBool *smooth)
+{
+  HycoFOM f = a->f;
+  PetscReal *slope = a->dstate + (size_t)d->parameter * (size_t)a->n_values, at[HYCO_MAX_PARAMETERS], most[2] = {0, 0};
+  PetscReal *v[3] = {NULL, a->value[0], a->value[1]}, *end;
+  Vec V;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(U, &V));
+  for (PetscInt j = 1; j < 3; j++) {
+    HycoDifferencePoint(d, f->scene, mu, j, at);
+    PetscCall(HycoFOMSetParameters(f, at));
+    PetscCall(VecWAXPY(V, d->step[j], dU, U));
+    PetscCall(RunTo(a, d->parameter, d->step[j], V, PETSC_FALSE));
+    PetscCall(HycoFEStateGet(a->state, NULL, &end));
+    PetscCall(PetscArraycpy(v[j], end, a->n_values));
+  }
+  PetscCall(VecDestroy(&V));
+  PetscCall(HycoFEStateGet(a->accepted ? a->accepted : f->path->begin, NULL, &v[0]));
+  for (PetscInt i = 0; i < a->n_values; i++)
+    slope[i] = d->weight[0] * v[0][i] + d->weight[1] * v[1][i] + d->weight[2] * v[2][i];
+  MeasureJumps(a, d, v, most);
+  HycoAllreduce(most, 2, MPIU_REAL, MPI_MAX, HycoComm(f));
+  *smooth = (PetscBool)(!a->failed && most[1] <= JUMP * most[0]);
+  HycoAllreduce(smooth, 1, HYCO_MPI_BOOL, MPI_LAND, HycoComm(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoAlongTake(HycoAlong a, const PetscReal mu[], const HycoDifference *d, Vec U, Vec dU,
+                             PetscBool *smooth)
 {
   HycoFOM f = a->f;
   PetscReal *du = a->du + d->parameter * a->n_dof, at[HYCO_MAX_PARAMETERS];
@@ -185,6 +358,8 @@ PetscErrorCode HycoAlongTake(HycoAlong a, const PetscReal mu[], const HycoDiffer
   Vec V;
 
   PetscFunctionBegin;
+  *smooth = PETSC_TRUE;
+  if (f->path->flows) PetscCall(TakeStates(a, mu, d, U, dU, smooth));
   if (!f->friction) PetscFunctionReturn(PETSC_SUCCESS);
   changed[d->parameter] = PETSC_TRUE;
   moves = HycoSceneChanges(f->scene, changed).nodes;
@@ -225,6 +400,32 @@ static PetscErrorCode Tangents(HycoAlong a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The state and f_int of the path are those of f->U. */
+static PetscErrorCode ShowState(HycoAlong a, PetscInt parameter, PetscReal step)
+{
+  HycoFOM f = a->f;
+  HycoPath p = f->path;
+  const PetscInt dim = f->part->dim;
+  PetscScalar *f_int;
+
+  PetscFunctionBegin;
+  PetscCall(RunTo(a, parameter, step, f->U, PETSC_FALSE));
+  PetscCall(VecGetArray(a->f_int, &f_int));
+  for (PetscInt k = 0; k < f->fe->n_dof; k++) {
+    const PetscInt row = HycoMeshOwned(f->part, k / dim);
+
+    if (row >= 0) f_int[row * dim + k % dim] = p->f_local[k];
+  }
+  PetscCall(VecRestoreArray(a->f_int, &f_int));
+  if (!a->accepted) {
+    a->accepted = p->begin;
+    a->f_path = p->f_old;
+  }
+  p->begin = a->state;
+  p->f_old = a->f_int;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoAlongShow(HycoAlong a, PetscInt parameter, PetscReal step, Vec L, Vec dL)
 {
   HycoFOM f = a->f;
@@ -232,6 +433,7 @@ PetscErrorCode HycoAlongShow(HycoAlong a, PetscInt parameter, PetscReal step, Ve
   const PetscScalar *r, *dr;
 
   PetscFunctionBegin;
+  if (f->path->flows) PetscCall(ShowState(a, parameter, step));
   if (!s) PetscFunctionReturn(PETSC_SUCCESS);
   HycoOnEach(HycoComm(f), Tangents(a));
   PetscCall(VecGetArrayRead(L, &r));
@@ -257,10 +459,16 @@ PetscErrorCode HycoAlongShow(HycoAlong a, PetscInt parameter, PetscReal step, Ve
 PetscErrorCode HycoAlongEnd(HycoAlong a)
 {
   HycoFOM f = a->f;
-  PetscReal *du = a->du_old;
+  HycoPath p = f->path;
+  PetscReal *du = a->du_old, *dstate = a->dstate0;
 
   PetscFunctionBegin;
   ShowPath(a);
+  if (p->flows) {
+    PetscCall(LeaveTangent(a));
+    a->dstate0 = a->dstate;
+    a->dstate = dstate;
+  }
   if (!f->friction) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Place(a, f->U, a->u_old));
   a->du_old = a->du;

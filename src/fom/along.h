@@ -6,18 +6,22 @@
 #include <hycopath.h>
 
 /* The derivatives by the parameters of what the steps of a path hand on: with friction the places of the surfaces, from
-   which the next step's slips count, and the work so far. */
+   which the next step's slips count, and the work so far; the laws' states. */
 typedef struct _n_HycoAlong *HycoAlong;
 PetscErrorCode HycoAlongCreate(HycoFOM fom, HycoAlong *along);
 /* NULL-safe. */
 PetscErrorCode HycoAlongDestroy(HycoAlong *along);
-/* The step from t0 to the path's accepted state; *able false: it has no derivatives by the system of its contacts. Collective,
-   as all functions below but those that are named. */
+/* The step from t0 to the path's accepted state, with K as its consistent tangent; *able false: it has no derivatives by the
+   system of its contacts. Collective, as all functions below but those that are named. */
 PetscErrorCode HycoAlongStep(HycoAlong along, PetscReal t0, PetscBool *able);
-/* Whether the step's contacts slide with friction: L, and all vectors like it, then have a row for each tangent. */
+/* Whether the step's contacts slide with friction: L, and all vectors like it, then have a row for each tangent. Not
+   collective, as the next two. */
 PetscBool HycoAlongRubs(HycoAlong along);
-/* As HycoFEImbalance(), of all cells; u is overwritten where it is fixed. Not collective. */
-PetscErrorCode HycoAlongImbalance(HycoAlong along, PetscReal u[], PetscReal r[]);
+/* Whether the path depends on what the steps before it have left, and all forces on all parameters. */
+PetscBool HycoAlongFlows(HycoAlong along);
+/* As HycoFEImbalance(), of all cells, at the parameters of fe, `step` along a parameter; u is overwritten where it is
+   fixed. */
+PetscErrorCode HycoAlongImbalance(HycoAlong along, PetscInt parameter, PetscReal step, PetscReal u[], PetscReal r[]);
 /* The rows with tangents at the parameters of fe_surface, `step` along a parameter. Not collective. */
 PetscErrorCode HycoAlongRows(HycoAlong along, PetscInt parameter, PetscReal step, PetscInt start[], PetscInt dof[],
                              PetscReal value[], PetscReal gap[]);
@@ -25,9 +29,12 @@ PetscErrorCode HycoAlongRows(HycoAlong along, PetscInt parameter, PetscReal step
 PetscErrorCode HycoAlongCoefficients(HycoAlong along, PetscReal mu[]);
 /* Adds what the step changes in the derivatives of the work: L and w = D - B U with their derivatives. */
 PetscErrorCode HycoAlongSpend(HycoAlong along, PetscInt parameter, Vec L, Vec w, Vec dL, Vec dw);
-/* Takes the places at the end of the step, for displacements U + step dU at the parameter's points. */
-PetscErrorCode HycoAlongTake(HycoAlong along, const PetscReal mu[], const HycoDifference *difference, Vec U, Vec dU);
-/* Shows outputs the friction of L + step dL (all rows) at fe's parameters; stresses and reactions are those of f->U. */
+/* Takes the places and states at the end of the step, for displacements U + step dU at the parameter's points; *smooth
+   false: a law's slopes to the two sides differ, or it fails. */
+PetscErrorCode HycoAlongTake(HycoAlong along, const PetscReal mu[], const HycoDifference *difference, Vec U, Vec dU,
+                             PetscBool *smooth);
+/* Shows outputs the friction of L + step dL (all rows) at fe's parameters; stresses and reactions are those of f->U, as the
+   laws have it there. */
 PetscErrorCode HycoAlongShow(HycoAlong along, PetscInt parameter, PetscReal step, Vec L, Vec dL);
 /* Ends the step, with the path at its own state again: what was shown is taken back, and what was taken is handed on. */
 PetscErrorCode HycoAlongEnd(HycoAlong along);

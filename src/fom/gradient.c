@@ -11,6 +11,7 @@
 #include "along.h"
 
 #define CLOSED  1e-7 /* share of the largest gap below which one is closed */
+#define LAWS    2 /* quarters of the step with laws that flow, whose stresses at given strains are curved: eps^(1/3) */
 #define NOTHING 1e-8 /* share of the largest change of a gap below which it is round-off */
 
 typedef struct {
@@ -28,6 +29,7 @@ typedef struct {
   PetscBool stress;       /* the caller may hold the stresses */
   PetscBool rubs;         /* L has the rows of tangents */
   PetscBool regular;      /* the contacts determine the derivatives; */
+  PetscBool remembers;    /* of a path: the next step depends on this one */
   PetscBool idle;         /* of a path: they do not, but nothing loads or moves the bodies */
   PetscInt parameter;     /* that is moved, */
   PetscReal step;         /* by how much, */
@@ -121,7 +123,7 @@ static PetscErrorCode Forces(Work *o, Vec R)
   }
   PetscCall(PetscMalloc2(f->fe->n_dof, &u, f->fe->n_dof, &local));
   PetscCall(HycoFOMToLocal(f, o->U, u));
-  HycoOnEach(HycoComm(f), o->along && o->all ? HycoAlongImbalance(o->along, u, local)
+  HycoOnEach(HycoComm(f), o->along && o->all ? HycoAlongImbalance(o->along, o->parameter, o->step, u, local)
                                              : HycoFEImbalance(f->fe, u, (PetscBool)!o->all, local));
   PetscCall(VecGetArray(R, &r));
   for (PetscInt k = 0; k < f->fe->n_dof; k++) {
@@ -313,8 +315,8 @@ static PetscErrorCode Rest(Work *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The solution's change. *kink: an undecided contact takes another state towards the two sides. With friction, which
-   remembers where it was, such steps have no derivative. Collective. */
+/* The solution's change. *kink: an undecided contact takes another state towards the two sides. Where the step is
+   remembered, such a step has no derivative. Collective. */
 static PetscErrorCode Solve(Work *o, const HycoDifference *d, PetscBool *kink)
 {
   PetscReal most = 0;
@@ -323,7 +325,6 @@ static PetscErrorCode Solve(Work *o, const HycoDifference *d, PetscBool *kink)
   *kink = PETSC_FALSE;
   if (o->rubs) {
     PetscCall(HycoSolverTangentSolveCones(o->tangent, o->r, o->g, o->dC, d->step[1], o->dU, o->dL, o->dW, &o->regular));
-    if (o->regular) PetscCall(HycoAlongSpend(o->along, d->parameter, o->L, o->W[0], o->dL, o->dW));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (o->idle) {
@@ -331,8 +332,8 @@ static PetscErrorCode Solve(Work *o, const HycoDifference *d, PetscBool *kink)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(HycoSolverTangentSolve(o->tangent, o->r, o->g, d->sign, o->dU, o->dL, kink));
-  if (!o->dC) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecNorm(o->dC, NORM_INFINITY, &most));
+  if (!o->remembers) PetscFunctionReturn(PETSC_SUCCESS);
+  if (o->dC) PetscCall(VecNorm(o->dC, NORM_INFINITY, &most));
   o->regular = (PetscBool)(!*kink && most == 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -340,24 +341,34 @@ static PetscErrorCode Solve(Work *o, const HycoDifference *d, PetscBool *kink)
 /* One column of the gradient. Collective. */
 static PetscErrorCode Column(Work *o, PetscInt p, HycoGradient *gradient)
 {
-  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, turns, kink;
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, turns, kink, smooth;
+  const PetscBool flows = (PetscBool)(o->along && HycoAlongFlows(o->along));
   HycoDifference d;
   HycoChanges c;
 
   PetscFunctionBegin;
   changed[p] = PETSC_TRUE;
   c = HycoSceneChanges(o->f->scene, changed);
-  o->all = (PetscBool)(c.nodes || c.stiffness);
-  o->forces = HycoSceneForcesChange(o->f->scene, changed);
+  o->all = (PetscBool)(flows || c.nodes || c.stiffness);
+  o->forces = (PetscBool)(flows || HycoSceneForcesChange(o->f->scene, changed));
   HycoDifferenceSet(o->f->scene, o->mu, p, HYCO_GRADIENT_STEP, &d);
-  PetscCall(Differentiate(o, &d, &turns));
-  if (turns && o->dC) o->regular = PETSC_FALSE;
-  if (o->regular) PetscCall(Solve(o, &d, &kink));
+  for (PetscInt k = 0; flows && k < LAWS; k++) HycoDifferenceShrink(&d);
+  for (PetscInt k = 0; o->regular; k++) {
+    PetscCall(Differentiate(o, &d, &turns));
+    if (turns && o->remembers) o->regular = PETSC_FALSE;
+    if (o->regular) PetscCall(Solve(o, &d, &kink));
+    if (!o->along || !o->regular) break;
+    PetscCall(HycoAlongTake(o->along, o->mu, &d, o->U, o->dU, &smooth));
+    if (smooth) break;
+    /* A point that yields between mu and the points beside it; or at mu. */
+    o->regular = (PetscBool)(k < HYCO_GRADIENT_CLOSER);
+    HycoDifferenceShrink(&d);
+  }
   if (!o->regular) PetscFunctionReturn(PETSC_SUCCESS);
+  if (o->rubs) PetscCall(HycoAlongSpend(o->along, p, o->L, o->W[0], o->dL, o->dW));
   if (o->store)
     PetscCall(HycoGradientColumn(gradient, o->store, o->f->scene, o->mu, &d, (PetscBool)(turns || kink), Measure, o,
                                  o->output));
-  if (o->along) PetscCall(HycoAlongTake(o->along, o->mu, &d, o->U, o->dU));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -422,6 +433,7 @@ static PetscErrorCode Create(Work *o)
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(o->mu, f->fe->mu, f->scene->n_variables));
   o->stress = f->sigma_ready;
+  o->remembers = (PetscBool)(o->along && (f->friction || HycoAlongFlows(o->along)));
   PetscCall(PetscCalloc1(6 * f->scene->n_quantities + 1, &o->output));
   PetscCall(VecDuplicate(f->U, &o->U));
   PetscCall(VecCopy(f->U, o->U));

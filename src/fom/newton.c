@@ -188,6 +188,19 @@ static PetscErrorCode SolveSystem(HycoPath p, PetscBool first, const Progress *n
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoPathSolveAgain(HycoPath p, PetscBool *solved)
+{
+  const Progress now = {.residual = {0, 0, 0}};
+  const PetscInt kept = p->kept;
+  HycoStepAttempt a = {.why = ""};
+
+  PetscFunctionBegin;
+  PetscCall(SolveSystem(p, PETSC_FALSE, &now, &a));
+  p->kept = kept;
+  *solved = (PetscBool)!a.why[0];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A step of Newton's method: to the system's solution; Evaluate() and Shorten() determine the step length. The slope
    of the potential along the step is -(F - f_int) . dU. */
 static PetscErrorCode Advance(HycoPath p, PetscBool feasible, const HycoStepAttempt *a, Progress *now)

@@ -72,8 +72,8 @@ typedef struct {
   PetscBool done;                      /* no step so far lacks them */
 } Again;
 
-/* After an accepted step. Without friction the steps do not depend on each other, and those between the listed times are
-   left out. */
+/* After an accepted step. Those of elastic bodies without friction do not depend on each other, and are left out between
+   the listed times. */
 static PetscErrorCode Pass(HycoPath p, PetscReal t0, void *context)
 {
   Again *o = (Again *)context;
@@ -84,7 +84,7 @@ static PetscErrorCode Pass(HycoPath p, PetscReal t0, void *context)
   HycoGradient at = {.n_outputs = n, .n_parameters = np};
 
   PetscFunctionBegin;
-  if (!o->done || (!lists && !f->friction)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!o->done || (!lists && !f->friction && !p->flows)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoAlongStep(o->along, t0, &o->done));
   if (o->done) PetscCall(HycoFOMStateGradient(f, o->along, lists ? &there : NULL, &at, &o->done));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -155,7 +155,7 @@ PetscErrorCode HycoPathGradient(HycoFOM f, HycoGradient *gradient)
   PetscFunctionBegin;
   HycoCheck(p->ended, "there is no gradient: the path ends at t = %g, before its last time", (double)p->t);
   PetscCall(PetscArraycpy(mu, f->fe->mu, f->scene->n_variables));
-  if (!p->flows && !p->solver->iterative) HycoOnError(BySteps(f, mu, gradient, &done), f->solved = PETSC_FALSE);
+  if (!p->solver->iterative) HycoOnError(BySteps(f, mu, gradient, &done), f->solved = PETSC_FALSE);
   if (!done) HycoOnError(Beside(f, mu, gradient), f->solved = PETSC_FALSE);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

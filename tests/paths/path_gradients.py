@@ -84,13 +84,13 @@ class PathGradients(Case):
         self.assertLess(abs(found - (high - low) / WIDTH), 1e-6 * scale, what)
 
     def test_full_order(self):
-        """Elastic bodies without and with friction, by their steps, also where a body is let go between them; creep and yielding, by paths; at each listed
-        time. The path itself is that without gradients."""
+        """Elastic bodies without and with friction, also where one is let go between steps, creep without and with friction, and yielding,
+        by their steps: no path beside has a value; at each listed time. The path itself is that without gradients."""
         point = {'push': 61.0, 'stop': 2.3e-4}
         for laws, point, along in ((PLAIN, {**point, 'ratio': 0.31}, ('stop', 'ratio')), (RUB, {**point, 'rough': 0.23}, ('push', 'rough')),
                                    (None, {'push': 61.0, 'pull': 9.7, 'rough': 0.31}, ('pull', 'rough')),
-                                   (YIELD, {**point, 'limit': 39.0}, ('limit',)), (CREEP, {**point, 'rate': 1.1e-9}, ('push', 'rate'))):
-            scene = self.write(laws or (), SCENE if laws else REST)
+                                   (YIELD, {**point, 'limit': 39.0}, ('limit',)), (CREEP, {**point, 'rate': 1.1e-9}, ('push', 'rate')), (WARM, {**point, 'warm': 897.0}, ('warm',))):
+            scene = self.write(laws or (), SCENE if laws else REST, TRAP)
             solve = lambda at, *args, scene=scene: self.hyco('solve', '-scene', scene, *STEPS, '-mu', ','.join(map(repr, at.values())), *args)
             report = solve(point, '-gradient')
             self.assertEqual(report['gradient_kinks'], [])
