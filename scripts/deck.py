@@ -277,6 +277,8 @@ class Draft:
         if m and law != "STRAIN":
             self.notes.append(f"line {block.line}: *CREEP in time: under changing stress strain_hardening differs from it")
         material["creep"] = (a, n, m)
+        if "plastic" in material:
+            self.notes.append(f"line {block.line}: *CREEP beside *PLASTIC: both act at any stress, as in Abaqus; in CalculiX creep acts above the yield stress alone")
 
     # ---- sections and bodies
 

@@ -1216,7 +1216,9 @@ static PetscErrorCode Prepare(Export *e)
 
   PetscFunctionBegin;
   HycoCheck(!strcmp(m->model->type, "bodies"),
-            "a model of type %s cannot be exported; train one with -hyco_model_type bodies", m->model->type);
+            "a model of type %s cannot be exported; train one with -hyco_model_type bodies, which says where a scene "
+            "prevents it",
+            m->model->type);
   SetRanges(e->s);
   for (PetscInt p = 0; p < e->s->n_parameters; p++) mu[p] = (e->s->lo[p] + e->s->hi[p]) / 2;
   PetscCall(HycoROMPredict(m, e->s->n_parameters, mu));
