@@ -122,7 +122,8 @@ static PetscErrorCode JudgeEstimates(cJSON *json, const DriverColumns *c, PetscI
   for (PetscInt k = 0; k < n; k++) loose += value[k * c->n + c->estimates + DRIVER_ESTIMATES + 1] > 0;
   cJSON_AddNumberToObject(all, "position_arbitrary", loose);
   if (loose)
-    PetscCall(DriverPrint("at %d of %d contact leaves a motion of a body free: displacements are arbitrary there, and "
+    PetscCall(DriverPrint("at %d of %d contact leaves a motion of a body free: displacements and outputs of them are "
+                          "arbitrary there, and "
                           "not compared\n",
                           (int)loose, (int)n));
   for (PetscInt k = 0; k < n; k++) unseen += value[k * c->n + c->estimates + DRIVER_ESTIMATES] > HYCO_UNSEEN;

@@ -123,6 +123,11 @@ PetscBool HycoQuantityOfPosition(const HycoQuantity *q)
   return (PetscBool)((q->kind <= HYCO_QUANTITY_MEAN && q->field < XX) || q->kind == HYCO_QUANTITY_FRICTION);
 }
 
+PetscBool HycoSceneQuantityIsOfPosition(HycoScene scene, PetscInt q)
+{
+  return HycoQuantityOfPosition(&scene->quantity[q]);
+}
+
 /* A subset of HycoQuantitiesMarkCells(): stresses cost more to store than displacements, and outputs of
    displacements do not need them. */
 PetscErrorCode HycoQuantitiesMarkStressed(HycoScene scene, HycoMesh m, PetscBool stressed[])

@@ -169,6 +169,7 @@ body: {plug: {young: 2.1e5}, groove: {young: 1e5*soft, poisson: 0.33}}
 fixed: {base: {x: 0, y: 0}}
 pressure: {top: press*a, sides: squeeze*b}
 contact: {l: {type: surface, slave: left, master: wall, tolerance: 1, friction: mu}, r: {type: surface, slave: right, master: wall, tolerance: 1, friction: mu}}
+output: {rise: {mean: u_y, group: top}}
 history: {times: [0, 1, 2, 3, 4, 5], tables: {a: [[0, 0], [1, 1], [3, 1], [4, 0], [5, 0.5]], b: [[0, 0], [2, 1], [3, -1], [5, 1]]}}
 """
         self.written(scene.replace('soft]', 'mu]').replace('soft: {range: [0.5, 2]}', 'mu: {range: [0, 0.4]}').replace('*soft', ''), grid)
@@ -187,6 +188,7 @@ history: {times: [0, 1, 2, 3, 4, 5], tables: {a: [[0, 0], [1, 1], [3, 1], [4, 0]
         report = self.hyco('compare', '-scene', 'scene.yaml', '-model', 'scene.h5', '-values_press', '0,20', '-values_squeeze', -40, '-values_mu', 0)
         self.assertEqual(report['estimates']['position_arbitrary'], 1)
         self.assertLess(report['worst_u']['max'], 1e-6)
+        self.assertLess(report['worst_output_rise']['max'], 1e-8)
         report = self.hyco('predict', '-model', 'scene.h5', '-mu', '0,-40,0')
         self.assertEqual((report['position_arbitrary'], report['estimated_error_u']), (True, None))
 
