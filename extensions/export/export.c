@@ -1070,30 +1070,25 @@ static PetscErrorCode RunModel(Export *e, const PetscReal mu[], PetscInt j, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What outputs of one dimension are: 0 lengths, 1 stresses, 2 forces, 3 moments and works; 4 areas of contacts. */
-static int DimensionOf(const Export *e, PetscInt k)
+/* Of the scene's outputs, then of each contact's force, area and pressure. */
+static HycoDimension DimensionOf(const Export *e, PetscInt k)
 {
-  const PetscInt each = e->m->model->mesh->dim + 2, at = (k - e->s->n_quantities) % each;
-  const HycoQuantity *q = &e->s->quantity[k];
+  const PetscInt dim = e->m->model->mesh->dim, at = (k - e->s->n_quantities) % (dim + 2);
 
-  if (k >= e->s->n_quantities) return at < each - 2 ? 2 : at == each - 2 ? 4 : 1;
-  if (q->kind == HYCO_QUANTITY_AREA) return 4;
-  if (q->kind == HYCO_QUANTITY_MOMENT || (q->kind == HYCO_QUANTITY_FRICTION && q->field == HYCO_FRICTION_WORK))
-    return 3;
-  if (q->kind >= HYCO_QUANTITY_PRESSURE) return 1;
-  if (q->kind >= HYCO_QUANTITY_REACTION) return 2;
-  return HycoQuantityOfStress(q) ? 1 : 0;
+  if (k < e->s->n_quantities) return HycoQuantityDimension(&e->s->quantity[k]);
+  return at < dim ? HYCO_DIMENSION_FORCE : at == dim ? HYCO_DIMENSION_AREA : HYCO_DIMENSION_STRESS;
 }
 
 /* The size that errors of output k are relative to: the largest of its dimension, as one that vanishes by symmetry is round-off. */
 static PetscReal ScaleOf(const Export *e, const PetscReal most[], PetscInt k)
 {
-  const int dimension = DimensionOf(e, k);
+  const HycoDimension dimension = DimensionOf(e, k);
   PetscReal scale = most[k];
 
   for (PetscInt j = 0; j < e->out.m.n_outputs; j++) {
     if (DimensionOf(e, j) == dimension) scale = PetscMax(scale, most[j]);
-    if (DimensionOf(e, j) == 2 && dimension == 3) scale = PetscMax(scale, most[j] * HycoMeshLength(e->m->fe->mesh));
+    if (DimensionOf(e, j) == HYCO_DIMENSION_FORCE && dimension == HYCO_DIMENSION_WORK)
+      scale = PetscMax(scale, most[j] * HycoMeshLength(e->m->fe->mesh));
   }
   return scale;
 }

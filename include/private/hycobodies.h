@@ -406,6 +406,8 @@ PetscErrorCode HycoBodiesNameMotion(HycoBodiesWork work, const HycoBodiesSurface
 /* After a solve that failed: whether no pressures balance the loads on the rigid motions; name: how the body moves. */
 PetscErrorCode HycoBodiesLifts(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal L[],
                                char name[HYCO_LINE], PetscBool *lifts);
+/* g (p): row k of the contacts times the motions. */
+void HycoBodiesMotionRow(HycoBodiesWork work, PetscInt k, PetscReal g[]);
 /* The residuals at the contacts, recomputed from U and the forces; `stationarity` is that of floating bodies. */
 void HycoBodiesMeasure(HycoROM model, HycoKKT *kkt);
 PetscReal HycoBodiesUnbalanced(HycoBodiesWork work);

@@ -140,6 +140,9 @@ PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank);
 */
 PetscErrorCode HycoBlocksBalance(const HycoBlocks *blocks, PetscInt p, const PetscReal A[], const PetscReal f[],
                                  PetscReal rounding, PetscReal r[], PetscBool *exists);
+/* The same for n contacts without other laws: forces r >= 0. */
+PetscErrorCode HycoNormalsBalance(PetscInt p, PetscInt n, const PetscReal A[], const PetscReal f[], PetscReal rounding,
+                                  PetscReal r[], PetscBool *exists);
 /* Where none do: adds normal forces to r, so that f - A r is a motion along which no contact opens: the bodies slide by it. */
 PetscErrorCode HycoBlocksLeaveSlide(const HycoBlocks *blocks, PetscInt p, const PetscReal A[], const PetscReal f[],
                                     PetscReal r[]);
@@ -176,14 +179,7 @@ PetscErrorCode HycoLCPLemke(PetscInt n, const PetscReal M[], const PetscReal q[]
 
 /* -- the derivative of a dense problem's solution -- */
 
-enum { HYCO_TANGENT_OPEN, HYCO_TANGENT_UNDECIDED, HYCO_TANGENT_CLOSED };
 typedef struct _n_HycoTangent *HycoTangent;
-/* state[n]: of contacts with forces L, gaps w and flexibilities M_ii (0: not known). Undecided: force and gap are near
-   zero, the force by the displacement that it causes. size: of the gaps or of the displacements of the contacts. */
-PetscErrorCode HycoTangentStates(PetscInt n, const PetscReal L[], const PetscReal w[], PetscReal size,
-                                 const PetscReal flexibility[], PetscInt state[]);
-/* For states with which HycoTangentCreate() is not regular: undecided contacts whose small force is none of round-off are closed; *more: some were. */
-void HycoTangentCloseMore(PetscInt n, const PetscReal L[], PetscInt state[], PetscBool *more);
 /* Whether a contact is closed or undecided, when its flexibility is not known. */
 PetscBool HycoTangentMayTouch(PetscReal L, PetscReal w, PetscReal size);
 /* Why there is no derivative where the matrix is singular and no contact has a force. */
@@ -191,10 +187,11 @@ PetscBool HycoTangentMayTouch(PetscReal L, PetscReal w, PetscReal size);
   "no load presses a body here that contact alone holds, so that its position has no derivative; take a point at "     \
   "which it carries a load"
 /* The derivative with p free unknowns x before the n contacts, M as in HycoLCP (read now). rigid: they are rigid motions,
-   without stiffness. *regular: the closed
-   contacts determine their forces; otherwise only HycoTangentDestroy() (NULL-safe) may be called. */
-PetscErrorCode HycoTangentCreate(PetscInt p, PetscBool rigid, PetscInt n, const PetscReal M[], const PetscInt state[],
-                                 HycoTangent *tangent, PetscBool *regular);
+   without stiffness. A contact of force L and gap w is undecided if both are near zero, the force by the displacement that it causes; where the
+   others do not determine the solution, forces above round-off close it. size: of the gaps or of the displacements of the contacts. *regular: the
+   closed contacts determine their forces; otherwise only HycoTangentDestroy() (NULL-safe) may be called. */
+PetscErrorCode HycoTangentCreate(PetscInt p, PetscBool rigid, PetscInt n, const PetscReal M[], const PetscReal L[],
+                                 const PetscReal w[], PetscReal size, HycoTangent *tangent, PetscBool *regular);
 PetscErrorCode HycoTangentDestroy(HycoTangent *tangent);
 /* Undecided contacts whose rows do not depend on closed ones. */
 PetscInt HycoTangentUndecided(HycoTangent tangent);

@@ -146,6 +146,15 @@ typedef struct {
 } HycoQuantity;
 extern const char *const HycoQuantityFields[]; /* NULL ends */
 #define HYCO_FRICTION_WORK 3
+/* What it is, whatever the units: works include moments. */
+typedef enum {
+  HYCO_DIMENSION_LENGTH,
+  HYCO_DIMENSION_STRESS,
+  HYCO_DIMENSION_FORCE,
+  HYCO_DIMENSION_WORK,
+  HYCO_DIMENSION_AREA
+} HycoDimension;
+HycoDimension HycoQuantityDimension(const HycoQuantity *quantity);
 /* Its unit, from those of the scene; "": not known. */
 void HycoQuantityUnit(HycoScene scene, const HycoQuantity *quantity, char unit[HYCO_LINE]);
 

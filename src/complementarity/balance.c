@@ -12,6 +12,18 @@
 #define BALANCED   1e-9  /* of the load: below it forces balance */
 #define AGAINST    1e-10 /* work of a ray relative to its length and the motion's: below it no ray resists */
 
+PetscErrorCode HycoNormalsBalance(PetscInt p, PetscInt n, const PetscReal A[], const PetscReal f[], PetscReal rounding,
+                                  PetscReal r[], PetscBool *exists)
+{
+  PetscReal size = 0, rest;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < p; i++) size += f[i] * f[i];
+  PetscCall(HycoNNLS(p, n, A, f, r, &rest));
+  *exists = (PetscBool) !(rest > PetscMax(BALANCED * PetscSqrtReal(size), rounding));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The rays of the problem; column of A times each. */
 typedef struct {
   PetscInt n, *block;

@@ -36,38 +36,40 @@ PetscErrorCode HycoTangentDestroy(HycoTangent *tangent)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* L >= 0, w: gaps, n each. size: the scale of gaps and displacements. A force counts if it is not small beside the
-   largest, and its flexibility moves the gap by more than round-off. state: n. */
-PetscErrorCode HycoTangentStates(PetscInt n, const PetscReal L[], const PetscReal w[], PetscReal size,
-                                 const PetscReal flexibility[], PetscInt state[])
+enum { OPEN, UNDECIDED, CLOSED };
+
+/* By force and gap; M: of p unknowns and the contacts. A force counts if it is not small beside the largest, and its
+   flexibility moves the gap by more than round-off. */
+static void States(PetscInt p, PetscInt n, const PetscReal M[], const PetscReal L[], const PetscReal w[],
+                   PetscReal size, PetscInt state[])
 {
   PetscReal most = 0;
 
-  PetscFunctionBegin;
   for (PetscInt i = 0; i < n; i++) most = PetscMax(most, L[i]);
   for (PetscInt i = 0; i < n; i++) {
+    const PetscReal flexibility = M[(size_t)(p + i) * (size_t)(p + n) + (size_t)(p + i)];
     /* A contact whose own row is flexible must press noticeably: otherwise it may open for a small change. */
     const PetscBool closed =
-        (PetscBool)(L[i] > NEAR * most && (flexibility[i] <= 0 || L[i] * flexibility[i] > PRESSES * size));
+        (PetscBool)(L[i] > NEAR * most && (flexibility <= 0 || L[i] * flexibility > PRESSES * size));
 
-    state[i] = closed ? HYCO_TANGENT_CLOSED : w[i] <= NEAR * size ? HYCO_TANGENT_UNDECIDED : HYCO_TANGENT_OPEN;
+    state[i] = closed ? CLOSED : w[i] <= NEAR * size ? UNDECIDED : OPEN;
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where the closed contacts do not determine the solution, small forces do: those above round-off close theirs. *more: there
+/* Where the closed contacts do not determine the solution, small forces do: those above round-off close theirs. Whether there
    are some. */
-void HycoTangentCloseMore(PetscInt n, const PetscReal L[], PetscInt state[], PetscBool *more)
+static PetscBool CloseMore(PetscInt n, const PetscReal L[], PetscInt state[])
 {
   PetscReal most = 0;
+  PetscBool more = PETSC_FALSE;
 
-  *more = PETSC_FALSE;
   for (PetscInt i = 0; i < n; i++) most = PetscMax(most, L[i]);
   for (PetscInt i = 0; i < n; i++) {
-    if (state[i] != HYCO_TANGENT_UNDECIDED || !(L[i] > PUSHES * most)) continue;
-    state[i] = HYCO_TANGENT_CLOSED;
-    *more = PETSC_TRUE;
+    if (state[i] != UNDECIDED || !(L[i] > PUSHES * most)) continue;
+    state[i] = CLOSED;
+    more = PETSC_TRUE;
   }
+  return more;
 }
 
 /* A looser question than the state: contacts for which it is false need no row of the derivative. */
@@ -189,9 +191,9 @@ static PetscErrorCode Condense(HycoTangent t, const PetscReal M[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* *regular false: the closed contacts do not determine the solution; only Destroy may follow. M is read here alone. */
-PetscErrorCode HycoTangentCreate(PetscInt p, PetscBool rigid, PetscInt n, const PetscReal M[], const PetscInt state[],
-                                 HycoTangent *tangent, PetscBool *regular)
+/* For these states; *regular false: the closed contacts do not determine the solution. */
+static PetscErrorCode CreateFor(PetscInt p, PetscBool rigid, PetscInt n, const PetscReal M[], const PetscInt state[],
+                                HycoTangent *tangent, PetscBool *regular)
 {
   HycoTangent t;
 
@@ -205,8 +207,8 @@ PetscErrorCode HycoTangentCreate(PetscInt p, PetscBool rigid, PetscInt n, const 
   for (PetscInt i = 0; i < p; i++) t->set[t->n_set++] = i;
   for (PetscInt i = 0; i < n; i++) {
     /* Motions first, then closed contacts: the equations that hold to both sides. */
-    if (state[i] == HYCO_TANGENT_CLOSED) t->set[t->n_set++] = p + i;
-    if (state[i] == HYCO_TANGENT_UNDECIDED) t->open[t->n_open++] = p + i;
+    if (state[i] == CLOSED) t->set[t->n_set++] = p + i;
+    if (state[i] == UNDECIDED) t->open[t->n_open++] = p + i;
   }
   PetscCall(PetscMalloc1((size_t)t->n_set * (size_t)t->n_set + 1, &t->lu));
   PetscCall(PetscMalloc1(t->n_set + 1, &t->scale));
@@ -214,6 +216,24 @@ PetscErrorCode HycoTangentCreate(PetscInt p, PetscBool rigid, PetscInt n, const 
   PetscCall(PetscMalloc1(t->n_set + 1, &t->ipiv));
   PetscCall(Factor(t, rigid, M, regular));
   if (*regular) PetscCall(Condense(t, M));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* M is read here alone. */
+PetscErrorCode HycoTangentCreate(PetscInt p, PetscBool rigid, PetscInt n, const PetscReal M[], const PetscReal L[],
+                                 const PetscReal w[], PetscReal size, HycoTangent *tangent, PetscBool *regular)
+{
+  PetscInt *state;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n + 1, &state));
+  States(p, n, M, L, w, size, state);
+  *tangent = NULL;
+  do {
+    PetscCall(HycoTangentDestroy(tangent));
+    PetscCall(CreateFor(p, rigid, n, M, state, tangent, regular));
+  } while (!*regular && CloseMore(n, L, state));
+  PetscCall(PetscFree(state));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -697,24 +697,33 @@ static PetscErrorCode ReadFormulation(HycoScene s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+HycoDimension HycoQuantityDimension(const HycoQuantity *q)
+{
+  if (q->kind == HYCO_QUANTITY_AREA) return HYCO_DIMENSION_AREA;
+  if (q->kind == HYCO_QUANTITY_MOMENT || (q->kind == HYCO_QUANTITY_FRICTION && q->field == HYCO_FRICTION_WORK))
+    return HYCO_DIMENSION_WORK;
+  if (q->kind >= HYCO_QUANTITY_PRESSURE) return HYCO_DIMENSION_STRESS;
+  if (q->kind >= HYCO_QUANTITY_REACTION) return HYCO_DIMENSION_FORCE;
+  return HycoQuantityFields[q->field][0] == 'u' ? HYCO_DIMENSION_LENGTH : HYCO_DIMENSION_STRESS;
+}
+
 /* From the scene's units; "": not known, as of areas, whose dimension is that of the mesh. Products stand side by side,
    "N mm", "(N/mm) mm". */
 void HycoQuantityUnit(HycoScene s, const HycoQuantity *q, char unit[HYCO_LINE])
 {
-  const char *length = s->unit[HYCO_UNIT_LENGTH], *force = s->unit[HYCO_UNIT_FORCE],
-             *stress = s->unit[HYCO_UNIT_STRESS];
-  const PetscBool work = (PetscBool)(q->kind == HYCO_QUANTITY_FRICTION && q->field == HYCO_FRICTION_WORK);
+  const char *length = s->unit[HYCO_UNIT_LENGTH], *force = s->unit[HYCO_UNIT_FORCE];
+  const HycoDimension dimension = HycoQuantityDimension(q);
+  const PetscBool quotient = (PetscBool)(strchr(force, '/') != NULL);
 
-  if (q->kind == HYCO_QUANTITY_AREA || ((work || q->kind == HYCO_QUANTITY_MOMENT) && (!force[0] || !length[0])))
-    unit[0] = '\0';
-  else if (work || q->kind == HYCO_QUANTITY_MOMENT)
-    HycoFormat(unit, "%s%s%s %s", strchr(force, '/') ? "(" : "", force, strchr(force, '/') ? ")" : "", length);
-  else if (q->kind >= HYCO_QUANTITY_PRESSURE)
-    HycoFormat(unit, "%s", stress);
-  else if (q->kind >= HYCO_QUANTITY_REACTION)
+  unit[0] = '\0';
+  if (dimension == HYCO_DIMENSION_WORK && force[0] && length[0])
+    HycoFormat(unit, "%s%s%s %s", quotient ? "(" : "", force, quotient ? ")" : "", length);
+  else if (dimension == HYCO_DIMENSION_STRESS)
+    HycoFormat(unit, "%s", s->unit[HYCO_UNIT_STRESS]);
+  else if (dimension == HYCO_DIMENSION_FORCE)
     HycoFormat(unit, "%s", force);
-  else
-    HycoFormat(unit, "%s", HycoQuantityFields[q->field][0] == 'u' ? length : stress);
+  else if (dimension == HYCO_DIMENSION_LENGTH)
+    HycoFormat(unit, "%s", length);
 }
 
 /* The mesh may be missing: a program may give a DM. */

@@ -170,33 +170,23 @@ static PetscErrorCode Measure(void *context, const PetscReal mu[], PetscReal ste
 /* The derivative's matrix, of the closed and the undecided contacts. */
 static PetscErrorCode Close(Work *o)
 {
-  PetscReal *M, *L, *w, *flexibility, most = 0;
-  PetscInt *state;
-  PetscBool more = PETSC_TRUE;
+  PetscReal *M, *L, *w, most = 0;
   const size_t n = (size_t)(o->p + o->k);
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n * n + 1, &M));
-  PetscCall(PetscMalloc4(o->k, &L, o->k, &w, o->k, &flexibility, o->k, &state));
+  PetscCall(PetscMalloc2(o->k, &L, o->k, &w));
   PetscCall((*o->m->ops->jacobian)(o->m, o->k, o->contact, M));
   for (PetscInt j = 0; j < o->k; j++) {
-    const size_t at = (size_t)(o->p + j);
-
     /* Of a contact: its force and its gap at mu. Both nearly 0 is undecided, and gets the state that the derivative
        itself chooses. */
     L[j] = o->z[o->p + o->contact[j]];
     w[j] = o->w[0][o->p + o->contact[j]];
-    flexibility[j] = M[at * n + at];
     most = PetscMax(most, L[j]);
   }
-  PetscCall(HycoTangentStates(o->k, L, w, o->size, flexibility, state));
   /* Of bodies, whose unknowns are rigid motions, M is 0 there. */
-  for (o->regular = PETSC_FALSE; !o->regular && more;) {
-    PetscCall(HycoTangentDestroy(&o->tangent));
-    PetscCall(HycoTangentCreate(o->p, PETSC_FALSE, o->k, M, state, &o->tangent, &o->regular));
-    if (!o->regular) HycoTangentCloseMore(o->k, L, state, &more);
-  }
-  PetscCall(PetscFree4(L, w, flexibility, state));
+  PetscCall(HycoTangentCreate(o->p, PETSC_FALSE, o->k, M, L, w, o->size, &o->tangent, &o->regular));
+  PetscCall(PetscFree2(L, w));
   PetscCall(PetscFree(M));
   /* A singular matrix means forces that can be redistributed: a derivative of one of many distributions would be
      arbitrary. Of a path there are the differences. */

@@ -9,7 +9,6 @@
 #include <hycosolverimpl.h>
 
 #define LEFT     1e-6  /* of the square of a motion: below, nothing is left of it */
-#define BALANCED 1e-9  /* of the load on the motions: below, forces balance it */
 #define ROUNDING 1e-12 /* of all loads: below, their work on the motions is round-off */
 
 /* Adds normal forces to the forces r that come nearest to the load f, so that the rest f - A r is a motion along which no
@@ -83,20 +82,18 @@ static PetscErrorCode Slides(HycoSystem y, PetscInt p, const Vec z[], Vec L, Pet
 /* Without other cones: the nearest forces of least squares in L, whose rest is a motion that closes no contact. */
 static PetscErrorCode Lifts(HycoSystem y, PetscInt p, const Vec z[], Vec L, PetscBool *lifts)
 {
-  PetscReal *A, *f, *row, all, size = 0, rest;
+  PetscReal *A, *f, *row, all;
   PetscInt lo, hi;
+  PetscBool exists;
 
   PetscFunctionBegin;
   PetscCall(HycoSystemWork(y));
   PetscCall(PetscMalloc3(p * y->m, &A, p, &f, y->m, &row));
   PetscCall(HycoMotionRows(y->B, p, z, y->work_L, A));
-  for (PetscInt i = 0; i < p; i++) {
-    PetscCall(VecDot(y->F, z[i], &f[i]));
-    size += f[i] * f[i];
-  }
+  for (PetscInt i = 0; i < p; i++) PetscCall(VecDot(y->F, z[i], &f[i]));
   PetscCall(VecNorm(y->F, NORM_1, &all));
-  PetscCall(HycoNNLS(p, y->m, A, f, row, &rest));
-  *lifts = (PetscBool)(rest > PetscMax(BALANCED * PetscSqrtReal(size), ROUNDING * all));
+  PetscCall(HycoNormalsBalance(p, y->m, A, f, ROUNDING * all, row, &exists));
+  *lifts = (PetscBool)!exists;
   PetscCall(VecGetOwnershipRange(L, &lo, &hi));
   if (*lifts) PetscCall(HycoVecWrite(L, hi - lo, row + lo));
   PetscCall(PetscFree3(A, f, row));

@@ -190,11 +190,7 @@ PetscErrorCode HycoBodiesScale(HycoROM m)
       for (PetscInt j = 0; j < l; j++) w->BP[k * l + j] += value * in->P[o->row_at[e] * l + j];
     }
   }
-  PetscCall(PetscArrayzero(w->G, w->surface.n * b->p));
-  for (PetscInt k = 0; k < w->surface.n; k++) {
-    for (PetscInt e = o->row_start[k]; e < o->row_start[k + 1]; e++)
-      HycoBodiesAdd(b->p, o->row[e], o->Z + o->row_at[e] * b->p, w->G + k * b->p);
-  }
+  for (PetscInt k = 0; k < w->surface.n; k++) HycoBodiesMotionRow(o, k, w->G + k * b->p);
   PetscCall(PetscMalloc1(in->nd * PetscMax(l, b->r) + 1, &cells));
   for (PetscInt i = 0; i < in->nd * l; i++) cells[i] = in->A[i] / o->kappa[in->body[i / l]];
   TakeStrains(m, l, cells, w->response);

@@ -1099,6 +1099,15 @@ PetscReal HycoBodiesUnbalanced(HycoBodiesWork o)
 
 #define HOLDS 1e-10 /* share of the largest force below which a force is round-off */
 
+void HycoBodiesMotionRow(HycoBodiesWork o, PetscInt k, PetscReal g[])
+{
+  const PetscInt p = o->bodies->p;
+
+  for (PetscInt i = 0; i < p; i++) g[i] = 0;
+  for (PetscInt e = o->row_start[k]; e < o->row_start[k + 1]; e++)
+    HycoBodiesAdd(p, o->row[e], o->Z + o->row_at[e] * p, g);
+}
+
 /* Whether the contacts with a force leave a rigid motion free. By Cholesky's pivots of G^T G over them, G = B Z, relative to
    the motions' squared lengths over all contacts. */
 PetscErrorCode HycoBodiesLoose(HycoBodiesWork o, PetscInt n, const PetscReal Lambda[], PetscBool *loose)
@@ -1113,10 +1122,7 @@ PetscErrorCode HycoBodiesLoose(HycoBodiesWork o, PetscInt n, const PetscReal Lam
   PetscCall(PetscCalloc3(p * p, &gram, p, &all, p, &g));
   for (PetscInt k = 0; k < n; k++) least = PetscMax(least, HOLDS * Lambda[k]);
   for (PetscInt k = 0; k < n; k++) {
-    PetscCall(PetscArrayzero(g, p));
-    for (PetscInt e = o->row_start[k]; e < o->row_start[k + 1]; e++) {
-      for (PetscInt i = 0; i < p; i++) g[i] += o->row[e] * o->Z[o->row_at[e] * p + i];
-    }
+    HycoBodiesMotionRow(o, k, g);
     for (PetscInt i = 0; i < p; i++) all[i] += g[i] * g[i];
     for (PetscInt i = 0; i < p * p && Lambda[k] > least; i++) gram[i] += g[i / p] * g[i % p];
   }
@@ -1144,8 +1150,6 @@ void HycoBodiesNameFloating(HycoBodiesWork o, HycoScene scene, char name[HYCO_LI
   HycoFormat(name, "%s%s in its place", n > 1 ? "one of the bodies " : "body ", list);
 }
 
-#define BALANCES 1e-9 /* share of the load on the motions: below, forces balance it */
-
 /* By nonnegative least squares, as at full order: the rest is a motion that closes no contact. */
 PetscErrorCode HycoBodiesLifts(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal L[], char name[HYCO_LINE],
                                PetscBool *lifts)
@@ -1153,18 +1157,15 @@ PetscErrorCode HycoBodiesLifts(HycoBodiesWork o, const HycoBodiesSurface *s, con
   const PetscInt p = o->bodies->p;
   const PetscReal one = 1;
   const PetscBLASInt rows = (PetscBLASInt)p, columns = (PetscBLASInt)s->n, each = 1;
-  PetscReal *A, *f, *force, *gram, size, rest = 0, most = 0;
-  PetscBool regular;
+  PetscReal *A, *f, *force, *gram, most = 0;
+  PetscBool regular, exists;
 
   PetscFunctionBegin;
   *lifts = PETSC_FALSE;
   if (!p || o->lacks) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscCalloc4(p * s->n + 1, &A, p, &f, s->n + 1, &force, p * p, &gram));
   for (PetscInt i = 0; i < p; i++) f[i] = HycoBodiesLoadWork(o, i);
-  for (PetscInt k = 0; k < s->n; k++) {
-    for (PetscInt e = o->row_start[k]; e < o->row_start[k + 1]; e++)
-      HycoBodiesAdd(p, o->row[e], o->Z + o->row_at[e] * p, A + k * p);
-  }
+  for (PetscInt k = 0; k < s->n; k++) HycoBodiesMotionRow(o, k, A + k * p);
   /* In coordinates in which the motions of the surfaces are orthonormal, as at full order. */
   for (PetscInt i = 0; i < o->bodies->ns * p * p; i++) {
     const PetscReal *z = o->Z + i / (p * p) * p;
@@ -1174,10 +1175,8 @@ PetscErrorCode HycoBodiesLifts(HycoBodiesWork o, const HycoBodiesSurface *s, con
   PetscCall(HycoCholesky("U", p, gram, NULL, &regular));
   if (regular) BLAStrsm_("L", "U", "T", "N", &rows, &columns, &one, gram, &rows, A, &rows);
   if (regular) BLAStrsm_("L", "U", "T", "N", &rows, &each, &one, gram, &rows, f, &rows);
-  size = 0;
-  for (PetscInt i = 0; i < p; i++) size += f[i] * f[i];
-  PetscCall(HycoNNLS(p, s->n, A, f, force, &rest));
-  *lifts = (PetscBool)(rest > PetscMax(BALANCES * PetscSqrtReal(size), HycoBodiesLoadRounding(o)));
+  PetscCall(HycoNormalsBalance(p, s->n, A, f, HycoBodiesLoadRounding(o), force, &exists));
+  *lifts = (PetscBool)!exists;
   for (PetscInt k = 0; k < p * s->n; k++) f[k % p] -= A[k] * force[k / p];
   if (regular) BLAStrsm_("L", "U", "N", "N", &rows, &each, &one, gram, &rows, f, &rows);
   for (PetscInt i = 0; i < p; i++) most = PetscMax(most, PetscAbsReal(f[i]));

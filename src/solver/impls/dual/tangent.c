@@ -52,25 +52,16 @@ static PetscErrorCode Gaps(HycoSolverTangent t, Vec x, PetscReal gap[])
 /* The states of the contacts in the solution, and the matrix of the closed ones. */
 static PetscErrorCode Close(HycoSolverTangent t, Vec x, Vec L, PetscBool *regular)
 {
-  PetscReal *force, *gap, *flexibility;
+  PetscReal *force, *gap;
   const PetscReal *S;
-  PetscInt *state;
-  const PetscInt n = t->p + t->m;
-  PetscBool more = PETSC_TRUE;
 
   PetscFunctionBegin;
   HycoSolverGetCondensed(t->s, &t->m, &t->p, &S);
-  PetscCall(PetscMalloc4(t->m, &force, t->m, &gap, t->m, &flexibility, t->m, &state));
+  PetscCall(PetscMalloc2(t->m, &force, t->m, &gap));
   PetscCall(Gaps(t, x, gap));
   PetscCall(HycoVecGather(L, force));
-  for (PetscInt i = 0; i < t->m; i++) flexibility[i] = S[(size_t)(t->p + i) * (size_t)n + (size_t)(t->p + i)];
-  PetscCall(HycoTangentStates(t->m, force, gap, t->size, flexibility, state));
-  for (*regular = PETSC_FALSE; !*regular && more;) {
-    PetscCall(HycoTangentDestroy(&t->tangent));
-    PetscCall(HycoTangentCreate(t->p, PETSC_TRUE, t->m, S, state, &t->tangent, regular));
-    if (!*regular) HycoTangentCloseMore(t->m, force, state, &more);
-  }
-  PetscCall(PetscFree4(force, gap, flexibility, state));
+  PetscCall(HycoTangentCreate(t->p, PETSC_TRUE, t->m, S, force, gap, t->size, &t->tangent, regular));
+  PetscCall(PetscFree2(force, gap));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
