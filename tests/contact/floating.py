@@ -263,18 +263,19 @@ output: {fx: {force: x, contact: side}, fy: {force: y, contact: floor}}
             self.assertRegex(run.stderr, '^hyco: error: no contact force keeps body block .*: its position is arbitrary here, and has no derivative')
 
     def test_barely_held(self):
-        """A block on a floor that a wall holds by a billionth of the load: equilibrium gives the derivatives of the forces, also with the wall at a node without a
+        """A block on a seat that a wall holds by a billionth of the load: equilibrium gives the derivatives of the forces, also with the wall at a node without a
         flexibility of its own; without that force there is none."""
-        grid, axis = Grid(), np.linspace(0, 1, 4)
-        grid.box('quad4', [axis, axis], lambda x: x, 'block', {'x0': 'left', 'x1': 'right', 'y0': 'low', 'y1': 'top'})
-        self.written('scene: {mesh: mesh.msh, parameters: [px, py]}\nparameter: {px: {range: [0, 3]}, py: {range: [5, 20]}}\nbody: {block: {young: 1e3, poisson: 0.3}}\n'
-                     'traction: {top: {y: -py}, right: {x: -px}}\ncontact: {l: {type: obstacle, group: left, normal: {x: -1}, gap: 0}, '
-                     'f: {type: obstacle, group: low, normal: {y: -1}, gap: 0}}\noutput: {W: {force: x, contact: l}, N: {force: y, contact: f}}\n', grid)
+        grid, axis = Grid(), np.linspace(0, 1, 5)
+        grid.box('quad4', [3.1 * axis, 2.3 * axis], lambda x: x, 'block', {'x0': 'left', 'x1': 'right', 'y0': 'low', 'y1': 'top'})
+        grid.box('quad4', [np.linspace(-1.3, 4.3, 8), np.linspace(-0.5, 0, 3)], lambda x: x, 'seat', {'y0': 'base', 'y1': 'floor'})
+        self.written('scene: {mesh: mesh.msh, parameters: [px, py]}\nparameter: {px: {range: [0, 3]}, py: {range: [5, 20]}}\nbody: {block: {young: 1e3, poisson: 0.3}, seat: {young: 2e3, poisson: 0.3}}\n'
+                     'fixed: {base: {x: 0, y: 0}}\ntraction: {top: {y: -py}, right: {x: -px}}\ncontact: {l: {type: obstacle, group: left, normal: {x: -1}, gap: 0}, '
+                     'f: {type: surface, slave: low, master: floor}}\noutput: {W: {force: x, contact: l}, N: {force: y, contact: f}}\n', grid)
         self.hyco('train', '-scene', 'scene.yaml', '-scatter', 4, '-model', 'barely.h5', '-hyco_model_type', 'bodies', status=None)
         for command in (('solve', '-scene', 'scene.yaml'), ('predict', '-model', 'barely.h5')):
             for px in ('1e-8', '1e-4', '1'):
                 slope = self.hyco(*command, '-mu', f'{px},9', '-gradient')['gradient']
-                for output, p, expected in (('W', 'px', 1), ('W', 'py', 0), ('N', 'px', 0), ('N', 'py', 1)):
+                for output, p, expected in (('W', 'px', 2.3), ('W', 'py', 0), ('N', 'px', 0), ('N', 'py', 3.1)):
                     self.assertAlmostEqual(slope[output][p], expected, 6, (command[0], px, output, p))
             self.assertRegex(self.run_raw(*command, '-mu', '0,9', '-gradient').stderr, '^hyco: error: no contact force keeps body block ')
 
