@@ -34,7 +34,7 @@ install(FILES ${PROJECT_BINARY_DIR}/manual/hyco.fish DESTINATION ${CMAKE_INSTALL
 install(FILES README.md LICENSE CHANGELOG.md CONTRIBUTING.md CITATION.cff DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(FILES docs/report.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/hyco)
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} FILES_MATCHING PATTERN *.md PATTERN *.csv PATTERN *.png PATTERN *.json)
-install(PROGRAMS scripts/meshes scripts/plot scripts/convert scripts/deck.py scripts/fmu scripts/hyco.sbatch DESTINATION ${CMAKE_INSTALL_DOCDIR}/scripts)
+install(PROGRAMS scripts/meshes scripts/plot scripts/convert scripts/deck.py scripts/facing.py scripts/keywords.py scripts/fmu scripts/hyco.sbatch DESTINATION ${CMAKE_INSTALL_DOCDIR}/scripts)
 install(FILES extensions/export/runtime/fmi3.c DESTINATION ${CMAKE_INSTALL_DOCDIR}/extensions/export/runtime) # of scripts/fmu
 install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DOCDIR} PATTERN *.msh EXCLUDE PATTERN *.h5 EXCLUDE PATTERN *.xdmf EXCLUDE)
 

@@ -5,24 +5,13 @@ import collections
 import math
 import re
 
+from facing import Surface, adjusted
+from keywords import PROCEDURES, WHY
+
 STRUCTURAL = re.compile(r"(S[3-9]|STRI|SAX|SC\d|CSS|M3D|SFM|B[23]|PIPE|ELBOW|T[23]D|CONN|SPRING|DASHPOT|MASS|ROTARYI|GAP|ITS|R3D|R2D|RAX|RB|D$|COH|DCOUP|F3D|U\d|MCL|CMD)")
-# What a result is written of, what only affects how it is reached, and what the mesh has been read from
-QUIET = {"HEADING", "PREPRINT", "RESTART", "OUTPUT", "NODE OUTPUT", "ELEMENT OUTPUT", "CONTACT OUTPUT", "ENERGY OUTPUT", "NODE FILE", "EL FILE", "ELEMENT FILE",
-         "CONTACT FILE", "FILE FORMAT", "NODE PRINT", "EL PRINT", "CONTACT PRINT", "ENERGY PRINT", "SECTION PRINT", "PRINT", "MONITOR", "FIELD", "CONTROLS",
-         "CONDUCTIVITY", "SPECIFIC HEAT", "ASSEMBLY", "END ASSEMBLY", "END STEP", "SURFACE BEHAVIOR", "SECTION CONTROLS", "ORIENTATION", "INTEGRATED OUTPUT",
-         "INCREMENTATION OUTPUT", "PHYSICAL CONSTANTS", "FILTER", "DIAGNOSTICS", "TIME POINTS", "CONTACT PROPERTY ASSIGNMENT", "KINEMATIC", "DISTRIBUTING"}
 AXES = "xyz"
 NAMED = {"ENCASTRE": (1, 2, 3, 4, 5, 6), "PINNED": (1, 2, 3), "XSYMM": (1, 5, 6), "YSYMM": (2, 4, 6), "ZSYMM": (3, 4, 5), "XASYMM": (2, 3, 4), "YASYMM": (1, 3, 5),
          "ZASYMM": (1, 2, 6), "NOWARP": (), "NOOVAL": (), "NODEFORM": ()}
-WHY = {"FRICTION": "only a constant coefficient of a surface interaction is friction: in the draft", "EQUATION": "no equations between displacements",
-       "MPC": "no constraints of this kind", "COUPLING": "no couplings of a reference point, unless it does not move",
-       "DISTRIBUTING COUPLING": "no couplings of a reference point",
-       "HOURGLASS STIFFNESS": "cells are fully integrated", "TRANSFORM": "supports and loads in turned axes: see fixed: direction in scenes.md",
-       "SHELL SECTION": "no shells", "BEAM SECTION": "no beams", "MEMBRANE SECTION": "no membranes", "CONNECTOR SECTION": "no connectors", "SPRING": "see spring: in scenes.md",
-       "MASS": "no point masses", "DASHPOT": "no dampers", "CONTACT": "general contact: name the pairs of surfaces as contacts", "DYNAMIC": "no inertia", "DAMPING": "no inertia",
-       "PRE-TENSION SECTION": "no pretension: prescribe a displacement of one side", "CYCLIC SYMMETRY MODEL": "no cyclic symmetry", "MODEL CHANGE": "bodies and contacts stay",
-       "CHANGE FRICTION": "the first coefficient stays", "CHANGE SURFACE BEHAVIOR": "the first law stays",
-       "CONTACT CONTROLS": "no stabilisation is needed", "CONTACT STABILIZATION": "no stabilisation is needed"}
 
 
 class DeckError(Exception):
@@ -58,7 +47,6 @@ def product(value, name):
 Given = collections.namedtuple("Given", "step value unit amplitude block")
 HELD = "held"
 ADDED = ("force", "body force", "pressure", "traction", "gravity", "rotation")  # given twice in one step they are added
-KNOWN = {"OP", "AMPLITUDE", "LOAD CASE", "REGION TYPE", "FOLLOWER", "TYPE", "FIXED"}  # parameters of loads and supports that are read, or change nothing
 
 
 def value_at(rows, t, after):
@@ -115,8 +103,9 @@ def piecewise(rows, at):
 class Draft:
     """The scene of a deck. The mesh m gets the groups that the scene names; `left` has what is not converted: (block, text)."""
 
-    def __init__(self, m, name, facets_of, plain, frictionless=False):
-        self.m, self.deck, self.name, self.facets_of, self.plain = m, m.deck, name, facets_of, plain
+    def __init__(self, m, name, sides_of, plain, frictionless=False):
+        self.m, self.deck, self.name, self.sides_of, self.plain = m, m.deck, name, sides_of, plain
+        self.axes = m.deck.axes  # the deck's axes that are x, y and z of the draft
         self.left, self.notes = {}, []
         self.bodies, self.materials, self.body_of, self.thickness = {}, {}, {}, 1.0
         self.interactions, self.contacts, self.ties, self.rigids, self.loose = {}, {}, {}, [], {}
@@ -129,20 +118,24 @@ class Draft:
         self.ways, self.axis, self.differs, self.early = {}, None, {}, set()  # early: blocks of supports before the first step
         self.groups, self.tables, self.skipped, self.frictionless = set(), {}, False, frictionless
 
-    def leave(self, block, what, why=None):
+    def leave(self, block, what, why="has no counterpart"):
         """Notes what is not converted, once for each keyword and reason."""
         self.left.setdefault((what, why), [block, 0])[1] += 1
 
+    def note(self, text):
+        if text not in self.notes:
+            self.notes.append(text)
+
     def told(self):
         """A line for each entry that is not converted."""
-        for (what, why), (block, n) in sorted(self.left.items(), key=lambda e: (e[1][0].file, e[1][0].line)):
-            yield f"line {block.line}: {what}: {why or 'has no counterpart'}" + (f" ({n} times)" if n > 1 else "")
+        for (what, why), (block, n) in sorted(self.left.items(), key=lambda e: (len(e[1][0].place.split(",")), e[1][0].file, e[1][0].line)):
+            yield f"{block.place}: {what}: {why}" + (f" ({n} times)" if n > 1 else "")
 
     # ------------------------------------------------------------------------------------------------ sets
 
     def members(self, word, kinds):
         """The keys of a set's name or number, of nodes or cells; None: there is none."""
-        word = word.strip('"').upper()
+        word = word.upper()
         for sets in kinds:
             if word in sets:
                 return sets[word]
@@ -156,13 +149,13 @@ class Draft:
         """Keys of the nodes of a set or a number; a set of elements or a surface has those of its cells."""
         found = self.members(word, [self.deck.nsets])
         if found is None:
-            raise DeckError(f"line {block.line}: *{block.word} names {word}, which is no set of nodes")
+            raise DeckError(f"{block.place}: *{block.word} names {word}, which is no set of nodes")
         return found
 
     def cells(self, word, block):
         found = self.members(word, [self.deck.elsets])
         if found is None:
-            raise DeckError(f"line {block.line}: *{block.word} names {word}, which is no set of elements")
+            raise DeckError(f"{block.place}: *{block.word} names {word}, which is no set of elements")
         return [c for c in found if c in self.m.cells]
 
     def free_name(self, name, taken):
@@ -173,26 +166,39 @@ class Draft:
 
     def alone(self, word):
         """Whether a word is the number of a node or cell, not the name of a set."""
-        word = word.strip('"').upper()
+        word = word.upper()
         return bool(re.fullmatch(r"(.*\.)?\d+", word)) and word not in self.deck.nsets and word not in self.deck.elsets
 
     def node_name(self, word, block, what, points=False):
         """The name of a group of these nodes; single nodes of one block with the same `what` are one group. points: on which forces act."""
-        name = self.plain(f"{block.word}_{block.line}_{what}" if self.alone(word) else word.strip('"').upper())
+        name = self.plain(f"{block.word}_{block.line}_{what}" if self.alone(word) else word.upper())
         if points:
             return name + "_points"
         return name + "_nodes" if name in self.bodies or name in map(self.plain, self.deck.surfaces) else name  # the name of other groups too
 
-    def facet_group(self, word, block):
-        word = word.strip('"').upper()
-        if word in self.deck.surfaces:
-            self.kept["facet_groups"][self.plain(word)] = self.deck.surfaces[word]
+    def facet_group(self, word, block, other):
+        """The group of a surface; of one that goes round an edge, as the free skin of a set of elements does, the facets that face the other surface."""
+        word, other = word.upper(), self.deck.surfaces.get(other.upper(), [])
+        members = self.deck.surfaces.get(word, [])
+        sides = self.sides_of(self.m, members)
+        mine = Surface(self.m, sides, self.dim()) if sides and other else None
+        if mine and mine.turns():
+            faces = mine.facing(Surface(self.m, self.sides_of(self.m, other), self.dim()))
+            if 0 < len(faces) < len(sides):
+                self.note(f"{block.place}: *{block.word}: the {len(faces)} of {len(sides)} facets of {word} that face the other surface are taken")
+                return self.group("contact", self.plain(word), [sides[k][:2] for k in faces], True)
+        if members or word in self.deck.surfaces:
+            self.kept["facet_groups"][self.plain(word)] = members
         elif word in self.deck.nsets:
             self.kept["node_groups"][self.plain(word)] = self.deck.nsets[word]
         else:
-            raise DeckError(f"line {block.line}: *{block.word} names {word}, which is no surface (only those of elements and nodes are read)")
+            raise DeckError(f"{block.place}: *{block.word} names {word}, which is no surface (only those of elements and nodes are read)")
         self.groups.add(self.plain(word))
         return self.plain(word)
+
+    def axis_of(self, d):
+        """The axis of the draft of a degree of freedom of displacement; rotations are numbers."""
+        return AXES[self.axes.index(d - 1)] if d <= 3 else d
 
     def dim(self):
         return 3 if any(t.startswith("C3D") for t in self.deck.types) else 2
@@ -208,77 +214,84 @@ class Draft:
         """Reads the blocks in order and sets the mesh's groups."""
         for name, block in self.deck.types.items():
             if structural(name):
-                self.leave(block, f"*ELEMENT, TYPE={name}", "these elements are left out; a scene has solids only")
+                self.leave(block, f"*ELEMENT, TYPE={name}", "these elements are left out; a scene has solids only" +
+                           ("; a bar is a solid of its section, or spring: with EA over its length where it holds a point" if re.match(r"T[23]D", name) else ""))
             elif re.search(r"(8|4|20)[A-Z]*R", name) and name.startswith(("C3D8R", "CPE4R", "CPS4R", "CAX4R")):
                 self.leave(block, f"*ELEMENT, TYPE={name}", "cells are fully integrated, without hourglass control")
             elif name.startswith("C3D8I") or name in ("CPE4I", "CPS4I", "CAX4I"):
                 self.leave(block, f"*ELEMENT, TYPE={name}", "no incompatible modes: bending of such cells is stiffer")
+        for entry in self.deck.left:
+            self.leave(*entry)
         for block in self.deck.rest:
             try:
                 self.read(block)
             except (KeyError, ValueError, IndexError) as error:
-                raise DeckError(f"line {block.line}: *{block.word} is not as it should be ({type(error).__name__}: {error})") from None
+                raise DeckError(f"{block.place}: *{block.word} is not as it should be ({type(error).__name__}: {error})") from None
         self.finish()
 
     def read(self, block):
-        word, parameters, _ = block
-        if word == "MATERIAL":
-            self.material_now = self.materials.setdefault(parameters["NAME"].upper(), {})
-        elif word == "SURFACE INTERACTION":
-            self.interaction_now = self.interactions.setdefault(parameters["NAME"].upper(), {})
-        elif word in ("ELASTIC", "EXPANSION", "DENSITY", "PLASTIC", "CREEP") and self.material_now is not None:
-            getattr(self, "read_" + word.lower())(self.material_now, block)
-        elif word == "FRICTION":
-            self.read_friction(self.interaction_now, block)
-        elif word == "SURFACE BEHAVIOR" and self.interaction_now is not None and not self.steps:
-            self.read_surface_behavior(self.interaction_now, block)
-        elif hasattr(self, "on_" + re.sub(r"\W", "_", word).lower()):
-            getattr(self, "on_" + re.sub(r"\W", "_", word).lower())(block)
-        elif word not in QUIET:
-            self.leave(block, f"*{word}", WHY.get(word))
+        """What keywords.READ has is read by the method on_KEYWORD; what is not taken stands in the list of the reader already."""
+        name = "on_" + re.sub(r"\W", "_", block.word).lower()
+        if block.word in PROCEDURES:
+            if self.steps and not self.skipped:
+                self.steps.pop()
+            self.skipped = True  # the loads of this step too
+        elif block.word == "AMPLITUDE" and not block.taken:
+            self.amplitudes[block.parameters["NAME"].upper()] = None
+        elif block.taken and hasattr(self, name):
+            getattr(self, name)(block)
+
+    def on_material(self, block):
+        self.material_now = self.materials.setdefault(block.parameters["NAME"].upper(), {})
+
+    def on_surface_interaction(self, block):
+        self.interaction_now = self.interactions.setdefault(block.parameters["NAME"].upper(), {})
 
     # ---- materials
 
-    def read_elastic(self, material, block):
-        if block.parameters.get("TYPE", "ISO").upper() not in ("ISO", "ISOTROPIC"):
-            self.leave(block, f"*ELASTIC, TYPE={block.parameters['TYPE'].upper()}", "elasticity is isotropic, or a law of a program")
+    def on_elastic(self, block):
+        self.material_now["elastic"] = [(item(r, 0), item(r, 1), item(r, 2)) for r in block.rows]
+
+    def on_expansion(self, block):
+        self.material_now["expansion"] = ([(item(r, 0), item(r, 1)) for r in block.rows], real(block.parameters.get("ZERO")), block)
+
+    def on_density(self, block):
+        self.material_now["density"] = item(block.rows[0], 0)
+        if len({item(r, 0) for r in block.rows}) > 1:
+            self.leave(block, "*DENSITY that depends on the temperature", "the first row is taken")
+
+    def on_plastic(self, block):
+        rate, given = real(block.parameters.get("RATE")), self.material_now.get("plastic")
+        if rate > 0:
+            self.leave(block, f"*PLASTIC, RATE={said(rate)}", "yielding does not depend on the rate: the table of the lowest rate is taken")
+        if given and rate > given[2]:
             return
-        material["elastic"] = [(item(r, 0), item(r, 1), item(r, 2)) for r in block.rows]
-
-    def read_expansion(self, material, block):
-        if block.parameters.get("TYPE", "ISO").upper() not in ("ISO", "ISOTROPIC"):
-            self.leave(block, f"*EXPANSION, TYPE={block.parameters['TYPE'].upper()}", "expansion is isotropic")
-            return
-        material["expansion"] = ([(item(r, 0), item(r, 1)) for r in block.rows], real(block.parameters.get("ZERO")), block)
-
-    def read_density(self, material, block):
-        material["density"] = item(block.rows[0], 0)
-
-    def read_plastic(self, material, block):
-        if block.parameters.get("HARDENING", "ISOTROPIC").upper() != "ISOTROPIC":
-            self.leave(block, f"*PLASTIC, HARDENING={block.parameters['HARDENING'].upper()}", "hardening is isotropic")
         rows = [(item(r, 0), item(r, 1)) for r in block.rows]
         if len({item(r, 2) for r in block.rows}) > 1:
             self.leave(block, "*PLASTIC that depends on the temperature", "the rows of the first temperature are taken")
             rows = [(item(r, 0), item(r, 1)) for r in block.rows if item(r, 2) == item(block.rows[0], 2)]
+        self.material_now["plastic"] = (rows, block, rate)
+
+    def harden(self, rows, block):
+        """What linear hardening is of the rows of *PLASTIC."""
         if len(rows) > 2:
             self.leave(block, "*PLASTIC with more than two rows", "the draft hardens linearly from the first row to the last; see j2 in materials.md")
         elif len(rows) == 2:
-            self.notes.append(f"line {block.line}: *PLASTIC: hardening continues beyond the last row, where the deck is perfectly plastic")
-        material["plastic"] = rows
+            self.note(f"{block.place}: *PLASTIC: hardening continues beyond the last row, where the deck is perfectly plastic")
 
-    def read_creep(self, material, block):
+    def on_creep(self, block):
+        material = self.material_now
         law = block.parameters.get("LAW", "STRAIN").upper()
         row = block.rows[0] if block.rows else []
         a, n, m = item(row, 0), item(row, 1), item(row, 2)
-        if law not in ("STRAIN", "TIME", "NORTON") or len(block.rows) > 1 or not row:
-            self.leave(block, f"*CREEP, LAW={law}" + (" that depends on the temperature" if len(block.rows) > 1 else ""), "see norton and strain_hardening in materials.md")
+        if len(block.rows) > 1 or not row:
+            self.leave(block, f"*CREEP, LAW={law} of {len(block.rows)} rows", WHY["CREEP, LAW"])
             return
         if m and law != "STRAIN":
-            self.notes.append(f"line {block.line}: *CREEP in time: under changing stress strain_hardening differs from it")
+            self.note(f"{block.place}: *CREEP in time: under changing stress strain_hardening differs from it")
         material["creep"] = (a, n, m)
         if "plastic" in material:
-            self.notes.append(f"line {block.line}: *CREEP beside *PLASTIC: both act at any stress, as in Abaqus; in CalculiX creep acts above the yield stress alone")
+            self.note(f"{block.place}: *CREEP beside *PLASTIC: both act at any stress, as in Abaqus; in CalculiX creep acts above the yield stress alone")
 
     # ---- sections and bodies
 
@@ -291,7 +304,7 @@ class Draft:
             if self.bodies and thick != self.thickness:
                 self.leave(block, "*SOLID SECTION of another thickness", "all bodies have one thickness, which is 1")
             elif thick != 1:
-                self.notes.append(f"line {block.line}: *SOLID SECTION: the thickness {said(thick)} is 1 here: forces of *CLOAD are divided by it, and so are reactions and contact forces")
+                self.note(f"{block.place}: *SOLID SECTION: the thickness {said(thick)} is 1 here: forces of *CLOAD are divided by it, and so are reactions and contact forces")
             self.thickness = thick if not self.bodies else self.thickness
         alone = sum(b.word == "SOLID SECTION" and b.instance == block.instance for b in self.deck.rest) == 1
         title = self.free_name((block.instance if alone else f"{block.instance}.{name}") if block.instance else name, self.bodies)
@@ -304,13 +317,13 @@ class Draft:
     def surfaces(self, row, block):
         """The groups of a slave and a master; None, with a note, if one of them has no solid behind it."""
         if len(row) < 2:
-            raise DeckError(f"line {block.line}: *{block.word} needs two surfaces, the slave first")
+            raise DeckError(f"{block.place}: *{block.word} needs two surfaces, the slave first")
         for word in row[:2]:
-            found = self.deck.surfaces.get(word.strip('"').upper())
+            found = self.deck.surfaces.get(word.upper())
             if found == [] or any(cell not in self.m.cells for cell, _ in found or ()) or any(b.word == "SURFACE" and b.parameters.get("NAME", "").upper() == word.upper() for b in self.deck.rest):
-                self.leave(block, f"*{block.word} with a surface without solids", "a rigid surface is a contact of type obstacle (normal and gap as expressions), or a solid that is held")
+                self.leave(block, f"*{block.word} with a surface without solids", WHY["SURFACE, TYPE"])
                 return None
-        return [self.facet_group(w, block) for w in row[:2]]
+        return [self.facet_group(w, block, other) for w, other in (row[:2], row[1::-1])]
 
     def on_contact_pair(self, block):
         p = block.parameters
@@ -326,11 +339,27 @@ class Draft:
             if "TIED" in p:
                 self.ties[self.free_name(f"{slave}_{master}", self.ties)] = (slave, master, None)
                 continue
-            reach = max(real(p["ADJUST"]) if re.fullmatch(r"[\d.eEdD+-]+", p.get("ADJUST", "")) else 0, 0)
-            self.contacts[self.free_name(f"{slave}_{master}".lower(), self.contacts)] = (slave, master, interaction, reach, row, block)
+            if "ADJUST" in p:
+                self.adjust(block, slave, master)
+            whole = p.get("TYPE", "NODE TO SURFACE").upper() != "NODE TO SURFACE"
+            self.contacts[self.free_name(f"{slave}_{master}".lower(), self.contacts)] = (slave, master, interaction, whole)
+
+    def surface(self, name):
+        """The facets of a group of the draft; None of a group of nodes."""
+        sides = self.sides_of(self.m, self.kept["facet_groups"].get(name, []))
+        return Surface(self.m, sides, self.dim()) if sides else None
+
+    def adjust(self, block, slave, master):
+        """*CONTACT PAIR, ADJUST: nodes of the slave nearer than a clearance, or of a set, are moved onto the master."""
+        given, (mine, other) = block.parameters["ADJUST"], (self.surface(name) for name in (slave, master))
+        near = real(given) if re.fullmatch(r"[\d.eEdD+-]+", given) else None
+        chosen = set(self.nodes(given, block)) if near is None else ()
+        nodes = dict.fromkeys(n for f in mine.facets for n in f.nodes) if mine else self.kept["node_groups"][slave]
+        moved = adjusted(self.m, nodes, other, lambda n, clearance: clearance <= near if near is not None else n in chosen)
+        self.note(f"{block.place}: *CONTACT PAIR, ADJUST: {moved} of {len(nodes)} slave nodes are moved onto the master, in mesh.msh")
 
     def on_contact_inclusions(self, block):
-        if "ALL EXTERIOR" in block.parameters or not block.rows or not all(len(r) > 1 and r[0] and r[1] for r in block.rows):
+        if not block.rows or not all(len(r) > 1 and r[0] and r[1] for r in block.rows):
             self.leave(block, "*CONTACT INCLUSIONS", WHY["CONTACT"])
             return
         for row in block.rows:
@@ -338,7 +367,7 @@ class Draft:
             if not both:
                 continue
             slave, master = both
-            self.contacts[self.free_name(f"{slave}_{master}".lower(), self.contacts)] = (slave, master, "", 0, row, block)
+            self.contacts[self.free_name(f"{slave}_{master}".lower(), self.contacts)] = (slave, master, "", True)
 
     def on_contact(self, block):
         if not any(b.word == "CONTACT INCLUSIONS" for b in self.deck.rest):
@@ -353,15 +382,11 @@ class Draft:
         self.leave(block, "*CLEARANCE")
 
     def on_tie(self, block):
-        if "CYCLIC SYMMETRY" in block.parameters or "MULTISTAGE" in block.parameters:
-            self.leave(block, "*TIE, CYCLIC SYMMETRY", WHY["CYCLIC SYMMETRY MODEL"])
-            return
-        both = self.surfaces([w for w in block.rows[0] if w], block)
-        if not both:
-            return
-        slave, master = both
-        reach = block.parameters.get("POSITION TOLERANCE")
-        self.ties[self.free_name(block.parameters.get("NAME", "tie"), self.ties)] = (slave, master, real(reach) if reach else None)
+        for row in block.rows:
+            both = self.surfaces([w for w in row if w], block)
+            reach = block.parameters.get("POSITION TOLERANCE")
+            if both:
+                self.ties[self.free_name(block.parameters.get("NAME", "tie"), self.ties)] = (*both, real(reach) if reach else None)
 
     def on_rigid_body(self, block):
         p = block.parameters
@@ -370,32 +395,27 @@ class Draft:
             found.append([n for c in self.cells(p["ELSET"], block) for n in self.m.cells[c][1]])  # rigid facets are left out
         at = p.get("REF NODE", "")
         self.rigids.append((block, sorted({n for keys in found for n in keys}, key=str), self.nodes(at, block)[0] if at else None,
-                            self.nodes(p["ROT NODE"], block)[0] if "ROT NODE" in p else None))
+                            self.nodes(p["ROT NODE"], block)[0] if "ROT NODE" in p else None, {1, 2, 3}))
 
     def on_coupling(self, block):
         p, place = block.parameters, self.deck.rest.index(block)
-        after = self.deck.rest[place + 1].word if place + 1 < len(self.deck.rest) else ""
+        after = self.deck.rest[place + 1] if place + 1 < len(self.deck.rest) else block
         surface = p.get("SURFACE", "").upper()
-        if after != "KINEMATIC" or surface not in self.deck.surfaces and surface not in self.deck.nsets:
+        if after.word != "KINEMATIC" or surface not in self.deck.surfaces and surface not in self.deck.nsets:
             self.leave(block, "*COUPLING", WHY["COUPLING"])
             return
-        nodes = self.deck.nsets.get(surface) or [n for facet in self.facets_of(self.m, self.deck.surfaces[surface]) for n in facet]
-        self.rigids.append((block, sorted(set(nodes), key=str), self.nodes(p["REF NODE"], block)[0], None))
+        nodes = self.deck.nsets.get(surface) or [n for *_, facet in self.sides_of(self.m, self.deck.surfaces[surface]) for n in facet]
+        held = {d for row in after.rows for d in range(int(row[0]), int(item(row, 1, int(row[0]))) + 1)} or {1, 2, 3}
+        self.rigids.append((block, sorted(set(nodes), key=str), self.nodes(p["REF NODE"], block)[0], None, held))
 
     # ---- steps
 
     def on_step(self, block):
         self.skipped = False
         self.steps.append({"period": 1.0, "ramp": True, "creeps": False, "variation": block.parameters.get("AMPLITUDE", "").upper(), "seen": set()})
-        if "NLGEOM" in block.parameters and block.parameters["NLGEOM"].upper() != "NO":
-            self.leave(block, "*STEP, NLGEOM", "displacements and rotations are small")
-        if "PERTURBATION" in block.parameters:
-            self.leave(block, "*STEP, PERTURBATION", "the step is taken as an ordinary one")
 
     def procedure(self, block):
         at_once = block.word == "VISCO" or block.word != "STATIC" and "STEADY STATE" not in block.parameters
-        if "RIKS" in block.parameters:
-            self.leave(block, "*STATIC, RIKS", "loads follow the time, not an arc length")
         if self.steps:
             step = self.steps[-1]
             step.update(period=item(block.rows[0], 1) or 1.0 if block.rows else 1.0, ramp=(step["variation"] or ("STEP" if at_once else "RAMP")) == "RAMP",
@@ -407,27 +427,18 @@ class Draft:
         self.leave(block, f"*{block.word}", "temperatures are given, not solved for")
         self.procedure(block)
 
-    def other(self, block):
-        self.leave(block, f"*{block.word}", "only static steps and *VISCO have a counterpart")
-        if self.steps and not self.skipped:
-            self.steps.pop()
-        self.skipped = True  # the loads of this step too
-
-    on_dynamic = on_frequency = on_buckle = on_heat_transfer = on_modal_dynamic = on_steady_state_dynamics = on_substructure_generate = other
-
     def on_amplitude(self, block):
         """(rows, whether in total time, whether its values replace those of the loads); None: its loads follow the step's default."""
         p, name = block.parameters, block.parameters["NAME"].upper()
         kind = p.get("DEFINITION", "TABULAR").upper()
         numbers = [real(w) for row in block.rows for w in row if w]
-        odd = f"DEFINITION={kind}" if kind not in ("TABULAR", "EQUALLY SPACED", "SMOOTH STEP") else next((w for w in ("INPUT", "USER", "SCALEX", "SCALEY") if w in p), "")
-        if odd or not numbers:
+        if not numbers:
             self.amplitudes[name] = None
-            self.leave(block, f"*AMPLITUDE, {odd}" if odd else "*AMPLITUDE without rows", "its loads are as without an amplitude; write the function as a table of the history")
+            self.leave(block, "*AMPLITUDE without rows", WHY["AMPLITUDE, USER"])
             return
         rows = [(real(p.get("BEGIN")) + real(p["FIXED INTERVAL"]) * k, v) for k, v in enumerate(numbers)] if kind == "EQUALLY SPACED" else list(zip(numbers[::2], numbers[1::2]))
         if any(b[0] < a[0] for a, b in zip(rows, rows[1:])):
-            raise DeckError(f"line {block.line}: the times of *AMPLITUDE {name} do not increase")
+            raise DeckError(f"{block.place}: the times of *AMPLITUDE {name} do not increase")
         if kind == "SMOOTH STEP":
             self.leave(block, "*AMPLITUDE, DEFINITION=SMOOTH STEP", "it is linear between its rows, at which it is as in the deck")
         self.amplitudes[name] = ([(t + real(p.get("SHIFTX")), v + real(p.get("SHIFTY"))) for t, v in rows], p.get("TIME", "").upper().startswith("TOTAL"),
@@ -440,15 +451,13 @@ class Draft:
         if self.skipped:
             return False
         new = block.parameters.get("OP", "MOD").upper() == "NEW"
-        for name in sorted(set(block.parameters) - KNOWN):
-            self.leave(block, f"*{block.word}, {name}", "what this parameter says is not taken")
         if self.steps and block.word in self.steps[-1]["seen"]:
             if new and ("new", block.word) not in self.steps[-1]["seen"]:
                 self.leave(block, f"*{block.word}, OP=NEW after one without it in a step", "only the first of a step ends earlier loads")
         elif self.steps:
             self.steps[-1]["seen"].update({block.word, *([("new", block.word)] if new else [])})
             if new and block.word == "DLOAD" and any(self.given.get((kind, "DSLOAD")) for kind in kinds):
-                self.notes.append(f"line {block.line}: *DLOAD, OP=NEW: loads of *DSLOAD stay, as in Abaqus; CalculiX ends them too")
+                self.note(f"{block.place}: *DLOAD, OP=NEW: loads of *DSLOAD stay, as in Abaqus; CalculiX ends them too")
             for kind in kinds if new else ():
                 given = self.given.get((kind, block.word), {})
                 for atom, specs in given.items():
@@ -481,9 +490,6 @@ class Draft:
         if not self.begun(block, "fixed"):
             return
         p, dim = block.parameters, self.dim()
-        if "TYPE" in p and p["TYPE"].upper() != "DISPLACEMENT" or "SUBMODEL" in p or "USER" in p:
-            self.leave(block, "*BOUNDARY, " + ", ".join(w for w in ("TYPE", "SUBMODEL", "USER") if w in p), "prescribe the displacement, as a number or an expression")
-            return
         for row in block.rows:
             row = row + [""] * (4 - len(row))
             if row[1].upper() in NAMED:
@@ -496,14 +502,16 @@ class Draft:
                 self.leave(block, f"*BOUNDARY of degree of freedom {max(dofs)}", "only displacements are prescribed")
             name = self.node_name(row[0], block, "_".join(map(str, dofs)) + (f"_{said(value)}" if value else ""))
             for d in dofs:
-                axis, mine = AXES[d - 1] if d <= 3 else d, nodes if d <= dim else [n for n in nodes if n not in self.used]
+                axis = self.axis_of(d)
+                moves = axis in tuple(AXES[:dim])
+                mine = nodes if moves else [n for n in nodes if n not in self.used]
                 if "FIXED" in p:
                     mine = [n for n in nodes if self.given.get(("fixed", "BOUNDARY"), {}).get((n, axis))]
-                    if d <= dim and self.used.intersection(nodes) - set(mine):
+                    if moves and self.used.intersection(nodes) - set(mine):
                         self.leave(block, "*BOUNDARY, FIXED of what was free", "prescribe the displacement, as a number or an expression")
                 self.put("fixed", [(n, axis) for n in mine], HELD if "FIXED" in p else value, block)
                 held = [n for n in mine if n in self.used]
-                if d <= dim and held:
+                if moves and held:
                     self.aim("fixed", block, name, axis, held)
 
     def on_cload(self, block):
@@ -511,11 +519,12 @@ class Draft:
             return
         for row in block.rows:
             nodes, d = list(dict.fromkeys(self.nodes(row[0], block))), int(row[1])
-            if not self.used.issuperset(nodes) or d > self.dim():
+            axis = self.axis_of(d)
+            if not self.used.issuperset(nodes) or axis not in tuple(AXES[:self.dim()]):
                 self.leave(block, "*CLOAD on a reference point or a rotation", "a load on a rigid or coupled body: see contact type rigid, or a traction")
                 continue
-            self.put("force", [(n, AXES[d - 1]) for n in nodes], item(row, 2) / self.thickness, block, 1 / self.thickness)
-            self.aim("force", block, self.node_name(row[0], block, f"{d}_{said(item(row, 2))}", True), AXES[d - 1], nodes)
+            self.put("force", [(n, axis) for n in nodes], item(row, 2) / self.thickness, block, 1 / self.thickness)
+            self.aim("force", block, self.node_name(row[0], block, f"{d}_{said(item(row, 2))}", True), axis, nodes)
 
     def body_groups(self, word, block):
         """The bodies that a set of elements consists of; None if it divides one."""
@@ -532,7 +541,7 @@ class Draft:
             if step < now and before != way and ("new", block.word) not in self.steps[-1]["seen"]:
                 self.leave(block, f"*{block.word}, {row[1].upper()} whose direction changes", "it replaces the load of the step before" + ("; CalculiX adds it" if kind == "gravity" else ""))
             self.ways[kind, key] = (now, way, row)
-        return way[:self.dim()]
+        return [way[c] for c in self.axes[:self.dim()]]
 
     def on_dload(self, block):
         if not self.begun(block, "pressure", "gravity", "rotation", "body force"):
@@ -543,7 +552,7 @@ class Draft:
             if face and not any(c in self.body_of for c in self.cells(row[0], block)):
                 self.leave(block, "*DLOAD on elements that are no solids")
             elif face:
-                name = self.plain(f"PRESSURE_{block.line}_{said(size)}" if self.alone(row[0]) else f"{row[0].strip(chr(34)).upper()}_P{face[1]}")
+                name = self.plain(f"PRESSURE_{block.line}_{said(size)}" if self.alone(row[0]) else f"{row[0].upper()}_P{face[1]}")
                 self.press(block, name, [(c, int(face[1]) - 1) for c in self.cells(row[0], block)], size, row[0])
             elif kind not in ("GRAV", "CENTRIF", "BX", "BY", "BZ"):
                 self.leave(block, f"*DLOAD of type {kind}")
@@ -560,7 +569,7 @@ class Draft:
                     self.leave(block, "*DLOAD, CENTRIF about several axes", "the last axis is taken")
                 self.axis = turns
             else:
-                self.put("body force", [(title, kind[1].lower()) for title in self.body_groups(row[0], block)], size, block)
+                self.put("body force", [(title, self.axis_of("XYZ".index(kind[1]) + 1)) for title in self.body_groups(row[0], block)], size, block)
 
     def press(self, block, name, faces, size, word):
         """A pressure on faces of cells."""
@@ -568,7 +577,7 @@ class Draft:
         mine, others = self.given.get(("pressure", block.word), {}), self.given.get(("pressure", "DLOAD" if block.word == "DSLOAD" else "DSLOAD"), {})
         fresh = {f: mine.get((f, ""), ()) for f in faces}
         if any(any(g.step < now for g in others.get((f, ""), ())) for f in faces):
-            self.notes.append(f"line {block.line}: *{block.word}: its pressure and that of *DLOAD or *DSLOAD of an earlier step are added; CalculiX replaces it")
+            self.note(f"{block.place}: *{block.word}: its pressure and that of *DLOAD or *DSLOAD of an earlier step are added; CalculiX replaces it")
         if block.word == "DSLOAD" and any(specs and specs[-1].value is not None and specs[-1].step < now and self.ways[f] != word for f, specs in fresh.items()):
             self.leave(block, "*DSLOAD on faces that another surface loads in an earlier step", "it replaces that load there")
         self.put("pressure", [(f, "") for f in faces], size, block)
@@ -579,9 +588,9 @@ class Draft:
         if not self.begun(block, "pressure", "traction"):
             return
         for row in block.rows:
-            kind, size, word = row[1].upper(), item(row, 2), row[0].strip('"').upper()
+            kind, size, word = row[1].upper(), item(row, 2), row[0].upper()
             if word not in self.deck.surfaces:
-                raise DeckError(f"line {block.line}: *DSLOAD names {word}, which is no surface of elements")
+                raise DeckError(f"{block.place}: *DSLOAD names {word}, which is no surface of elements")
             faces, name = self.deck.surfaces[word], self.plain(word)
             if kind in ("P", "P1", "PNOR"):
                 self.press(block, name, faces, size, word)
@@ -601,17 +610,12 @@ class Draft:
         return mine
 
     def on_initial_conditions(self, block):
-        if block.parameters.get("TYPE", "").upper() != "TEMPERATURE":
-            self.leave(block, f"*INITIAL CONDITIONS, TYPE={block.parameters.get('TYPE', '').upper()}")
-            return
         for row in block.rows:
             for title in self.of_bodies(row[0], block):
                 self.initial[title] = item(row, 1)
 
     def on_temperature(self, block):
-        if "FILE" in block.parameters or not self.begun(block, "temperature") or not block.rows and block.parameters.get("OP", "").upper() != "NEW":
-            if not self.skipped:
-                self.leave(block, "*TEMPERATURE from a file", "write the field as an expression of x, y, z and t")
+        if not self.begun(block, "temperature"):
             return
         for row in block.rows:
             self.put("temperature", self.of_bodies(row[0], block), item(row, 1), block)
@@ -632,7 +636,7 @@ class Draft:
                     if (default or not values) and (step["ramp"] or kind == "fixed"):  # displacements are ramps also where loads act at once
                         parts.append((1, [(begin, 0.0 if curves else now), (end, goal)]))
                         if not step["ramp"] and abs(goal - now) > 0:
-                            self.differs.setdefault(values[0].block.line, f"line {values[0].block.line}: *BOUNDARY without an amplitude is a ramp also here, as in Abaqus; CalculiX applies it at once")
+                            self.differs.setdefault(values[0].block.line, f"{values[0].block.place}: *BOUNDARY without an amplitude is a ramp also here, as in Abaqus; CalculiX applies it at once")
                     elif default or not values:
                         parts.append((1, [(begin, goal)]))
                     piece = summed(parts, begin, end)
@@ -738,67 +742,69 @@ class Draft:
         self.steps = self.steps or [{"period": 1.0, "ramp": True, "creeps": False}]
         for g in (g for given in self.given.values() for specs in given.values() for g in specs):
             if g.amplitude and g.amplitude not in self.amplitudes:
-                raise DeckError(f"line {g.block.line}: *{g.block.word} names the amplitude {g.amplitude}, which is not there")
-        for block, nodes, at, turn in self.rigids:
-            self.hold(block, nodes, at, turn)
-        for name, (slave, master, interaction, *_) in list(self.contacts.items()):
+                raise DeckError(f"{g.block.place}: *{g.block.word} names the amplitude {g.amplitude}, which is not there")
+        for rigid in self.rigids:
+            self.hold(*rigid)
+        named = {interaction for *_, interaction, _ in self.contacts.values()}
+        for name, (slave, master, interaction, _) in list(self.contacts.items()):
             if self.interactions.get(interaction, {}).get("tied"):  # the interaction may stand after the contact
                 self.ties[self.free_name(f"{slave}_{master}", self.ties)] = (slave, master, None)
                 del self.contacts[name]
         for kind, word in self.targets:
             self.gather(kind, word)
         self.load_bodies()
-        self.soften()
+        self.soften(named)
         for kind, groups in self.kept.items():
             setattr(self.m, kind, groups)
         self.m.cell_groups = {title: keys for title, (keys, _, _) in self.bodies.items()}
 
-    def hold(self, block, nodes, at, turn):
-        """A rigid set whose reference point is held is one of prescribed nodes; else it has no counterpart."""
+    def hold(self, block, nodes, at, turn, coupled):
+        """A rigid set whose reference point is held, in the coupled directions, is one of prescribed nodes; else it has no counterpart."""
         dim, given = self.dim(), self.given.setdefault(("fixed", "BOUNDARY"), {})
-        moves = [given.get((at, axis)) for axis in AXES[:dim]]
-        turns = [given.get((at if turn is None else turn, d if turn is None else AXES[d - 4])) for d in ((6,) if dim == 2 else (4, 5, 6))]
-        if not all(moves) or not all(turns) or any(g.value not in (0.0, None, HELD) for specs in turns for g in specs):
+        moves = {axis: given.get((at, axis)) for d, axis in enumerate(AXES[:dim], 1) if self.axes[d - 1] + 1 in coupled}
+        turns = [given.get((at if turn is None else turn, d if turn is None else AXES[d - 4])) for d in ((4 + self.axes[2],) if dim == 2 else (4, 5, 6))]
+        if not all(moves.values()) or not all(turns) or any(g.value not in (0.0, None, HELD) for specs in turns for g in specs):
             self.leave(block, f"*{block.word}", "only a rigid part whose reference point is held in all displacements and rotations (then: fixed); see contact type rigid for one under a load")
             return
         for specs in turns:
             self.lasting(specs)
         mine = [n for n in nodes if n in self.used]
         name = self.free_name(f"rigid_{block.line}", self.groups)
-        for axis, specs in zip(AXES, moves) if mine else ():  # rigid facets alone: their contacts are listed
+        for axis, specs in moves.items() if mine else ():  # rigid facets alone: their contacts are listed
             given.update({(n, axis): specs for n in mine})
             self.targets.setdefault(("fixed", "BOUNDARY"), {}).setdefault(name, {})[axis] = mine
 
-    def read_surface_behavior(self, interaction, block):
+    def on_surface_behavior(self, block):
+        if self.steps or self.interaction_now is None:
+            self.leave(block, "*SURFACE BEHAVIOR in a step", WHY["CHANGE SURFACE BEHAVIOR"])
+            return
         law = block.parameters.get("PRESSURE-OVERCLOSURE", "HARD").upper()
-        if law == "TIED":
-            interaction["tied"] = True
-        elif law == "LINEAR" and block.rows:
-            interaction["slope"] = (item(block.rows[0], 0), block)
-        elif law != "HARD":
-            self.leave(block, f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE={law}", "contact is hard")
-        if "NO SEPARATION" in block.parameters:
-            self.leave(block, "*SURFACE BEHAVIOR, NO SEPARATION", "contacts open; see tie in scenes.md")
+        self.interaction_now["tied"] = law == "TIED"
+        if law in ("LINEAR", "TIED") and block.rows:
+            self.interaction_now["slope"] = (item(block.rows[0], 0), block)
 
-    def soften(self):
+    def soften(self, interactions):
         """Lists contact whose pressure rises so slowly with its overclosure that it is no penalty: not ten times as stiff as a body of the mesh's length."""
         length = max(max(c) - min(c) for c in zip(*(self.m.nodes[n] for n in self.used)))
         stiff = max((row[0] for m in self.materials.values() for row in m.get("elastic", ())), default=0.0)
-        for name in sorted({contact[2] for contact in self.contacts.values()}):
+        for name in sorted(interactions):
             slope, block = self.interactions.get(name, {}).get("slope", (math.inf, None))
+            law = block and f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE={block.parameters['PRESSURE-OVERCLOSURE'].upper()}"
+            hard = "ties are rigid" if block and self.interactions[name]["tied"] else "contact is hard"
             if slope * length < 10 * stiff:
-                self.leave(block, "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", "contact is hard")
+                self.leave(block, law, hard)
             elif block:
-                self.notes.append(f"line {block.line}: *SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR: taken as a penalty; contact is hard")
+                self.note(f"{block.place}: {law}: taken as a penalty; {hard}")
 
-    def read_friction(self, interaction, block):
+    def on_friction(self, block):
         """The coefficient of an interaction, of which other forms and changes within a step are left."""
+        interaction = self.interaction_now
         given = bool(block.rows) and interaction is not None and not self.steps
         if given:
             interaction["friction"] = item(block.rows[0], 0)
         if self.frictionless:
             self.leave(block, "*FRICTION", "left out by --frictionless; the coefficient stands beside the contact")
-        elif not given or len(block.rows) > 1 or any(word in block.parameters for word in ("ROUGH", "EXPONENTIAL DECAY", "USER", "TAUMAX", "ANISOTROPIC")):
+        elif not given or len(block.rows) > 1:
             self.leave(block, "*FRICTION", WHY["FRICTION"])
 
     def friction(self, interaction):
@@ -847,7 +853,7 @@ class Draft:
         out["young"] = piecewise([(e, t) for e, _, t in rows], "temperature") if hot else said(rows[0][0])
         out["poisson"] = piecewise([(n, t) for _, n, t in rows], "temperature") if hot else said(rows[0][1])
         if len(rows) > 1 and not hot:
-            self.notes.append(f"{name} depends on the temperature, which the deck does not give: its first row is taken")
+            self.note(f"{name} depends on the temperature, which the deck does not give: its first row is taken")
         if "density" in m:
             out["density"] = said(m["density"])
         if hot and ("expansion" in m or len(rows) > 1):
@@ -865,7 +871,8 @@ class Draft:
             out["law"] = "strain_hardening" if power else "norton"
             out.update(rate=self.over_time([(a / (1 + power), creeps)], "creep"), exponent=said(n), **({"time_exponent": said(1 + power)} if power else {}))
         if "plastic" in m:
-            rows = m["plastic"]
+            rows, block, _ = m["plastic"]
+            self.harden(rows, block)
             out["law"] = "norton" if creeps else "j2"
             out["yield"] = said(rows[0][0])
             if len(rows) > 1:
@@ -875,35 +882,17 @@ class Draft:
             out["element"] = "standard"
         elif "law" not in out and max(n for _, n, _ in rows) > 0.49 and kinds <= {"quad4", "hex8"} and self.formulation() != "plane_stress":
             out["element"] = "bbar"
-            self.notes.append(f"line {block.line}: {title}: nearly incompressible: its cells do not lock, as those of Abaqus; CalculiX's do (element: standard)")
+            self.note(f"{block.place}: {title}: nearly incompressible: its cells do not lock, as those of Abaqus; CalculiX's do (element: standard)")
         return out
 
     def reach(self, slave, master):
-        """How far any slave node is from the nearest master node, and the shortest slave edge; by boxes of this size."""
-        def nodes(name):
-            if name in self.m.node_groups:
-                return set(self.m.node_groups[name]), []
-            keys, edges = set(), []
-            for facet in self.facets_of(self.m, self.m.facet_groups.get(name, [])):
-                keys.update(facet)
-                edges += [math.dist(self.m.nodes[a], self.m.nodes[b]) for a, b in zip(facet, facet[1:])]
-            return keys, edges
-        (mine, edges), (others, theirs) = nodes(slave), nodes(master)
-        edges = edges or theirs  # a slave of nodes has none
-        if not mine or not others or not edges:
+        """How far any slave node is from the master's facets, and the shortest slave edge."""
+        mine, other = self.surface(slave), self.surface(master)
+        nodes = {n for f in mine.facets for n in f.nodes} if mine else self.m.node_groups.get(slave)
+        if not nodes or not other:
             return None
-        place = sorted(self.m.nodes[n] for n in others)
-        first = [x[0] for x in place]
-        far = 0.0
-        for n in mine:
-            x, best, at = self.m.nodes[n], math.inf, bisect.bisect(first, self.m.nodes[n][0])
-            for way in (range(at, len(place)), range(at - 1, -1, -1)):
-                for k in way:
-                    if abs(first[k] - x[0]) >= best:
-                        break
-                    best = min(best, math.dist(x, place[k]))
-            far = max(far, best)
-        return far, min(edges)
+        edges = [math.dist(self.m.nodes[a], self.m.nodes[b]) for f in (mine or other).facets for a, b in zip(f.nodes, f.nodes[1:])]  # a slave of nodes has none
+        return max(other.nearest(self.m.nodes[n])[0] for n in nodes), min(edges)
 
     def entries(self):
         """The sections of the scene: [(section, [(key, text, comment)])]."""
@@ -924,11 +913,11 @@ class Draft:
         yield "contact", [self.contact(name) for name in self.contacts]
 
     def contact(self, name):
-        slave, master, interaction, reach, row, _ = self.contacts[name]
-        kind = "mortar" if self.quadratic() else "surface"
+        slave, master, interaction, whole = self.contacts[name]
+        kind = "mortar" if self.quadratic() or whole and slave in self.kept["facet_groups"] else "surface"
         text, far = f"type: {kind}, slave: {slave}, master: {master}", self.reach(slave, master)
-        if far and max(far[0], reach) > 0.099 * far[1]:
-            least = max(far[0], reach)
+        if far and far[0] > 0.099 * far[1]:
+            least = far[0]
             short = float(f'{1.001 * least:.3g}')
             text += f", tolerance: {said(short if short > 1.0005 * least else float(f'{1.001 * least:.5g}'))}"
         if (slave, master) in self.loose:
@@ -945,10 +934,10 @@ class Draft:
         """The draft; afterwards `left` is complete."""
         self.history = self.inelastic() or self.rubs() or len(self.steps) > 1
         if self.rubs():
-            self.notes.append("friction is solved at full order and by models of bodies, with *TIE by hybrid models; --frictionless leaves it out. More listed times follow its path more closely.")
+            self.note("friction is solved at full order and by models of bodies, with *TIE by hybrid models; --frictionless leaves it out. More listed times follow its path more closely.")
         creep = next((b for b in self.deck.rest if b.word == "CREEP"), None)
         if creep and not all(step["creeps"] for step in self.steps):
-            self.notes.append(f"line {creep.line}: *CREEP acts in *VISCO steps alone" + (": its rate is 0 in the others" if self.creeps() else ", of which there is none: it is left out"))
+            self.note(f"{creep.place}: *CREEP acts in *VISCO steps alone" + (": its rate is 0 in the others" if self.creeps() else ", of which there is none: it is left out"))
         self.notes += self.differs.values()
         sections = list(self.entries())
         lines = [f"# Draft from {self.name}. Displacements are small; bodies are in the deck's units.",

@@ -163,6 +163,8 @@ class Convert(Case):
         self.assertEqual(report['command'], 'check')
         with open(self.path('m.msh'), encoding='ascii') as f:
             self.assertIn('\n10 10 10\n', f.read())
+        empty = '         9         0         0         0         0         0         0         0\nnothing\n\n'
+        self.assertEqual(self.convert('empty.unv', UNV.replace('  2467\n', '  2467\n' + empty)), self.convert('cube.unv', UNV))
 
     def test_second_order(self):
         """A cube of one C3D20 and a tetrahedron of one C3D10, in Abaqus's order: pressure on each side S1, S2, ... has the resultant of that side, gravity that of the volume."""
@@ -181,6 +183,14 @@ class Convert(Case):
             groups = self.convert('second.inp', text)
             self.assertEqual(groups['BODY'], (1, {'C3D20R': 'hex20', 'C3D10': 'tet10'}[kind]))
             self.pushed(kind, volume, pushes)
+
+    def test_gmsh_second_order(self):
+        """What gmsh writes as .inp in order 2: lines of T3D3 with the node in the middle at the end, triangles of CPS6. Trusses of Abaqus have it between the ends."""
+        nodes = '*NODE\n1,0,0\n2,1,0\n3,0,1\n4,.5,0\n5,.5,.5\n6,0,.5\n'
+        for line in ('1, 2, 4', '1, 4, 2'):
+            groups = self.convert('t3.inp', f'{nodes}*ELEMENT, TYPE=T3D3, ELSET=L\n1, {line}\n*ELEMENT, TYPE=CPS6, ELSET=S\n2, 1, 2, 3, 4, 5, 6\n')
+            self.assertEqual(groups, {'S': (1, 'tri6'), 'L': (1, 'line3')})
+            self.checked('scene: {mesh: m.msh}\nbody: {S: {young: 100}}\nfixed: {L: {x: 0, y: 0}}\n')
 
     def test_several_types(self):
         """A prism and a pyramid in Abaqus's order: pressure on each side S1, S2, ... has the resultant of that side, gravity that of the volume; quadrilaterals
@@ -202,7 +212,8 @@ class Convert(Case):
         for name, text, words in (('a.inp', FLAT.replace('CPE4', 'C3D15'), 'elements of type C3D15'), ('g.inp', FLAT.replace('CPE4', 'CPE8R'), 'element 1 of type CPE8R has 4 nodes; 8 are expected'), ('b.inp', '*Heading\n', 'has no cells'),
                                   ('c.inp', FLAT.replace('1, 1, 2, 5, 4', '1, 1, 2, 5, 44'), 'is not as such a file should be'),
                                   ('d.inp', PARTS.replace(' 0., 1.', ' 0., 1.\n 0,0,0,0,0,1'), 'two points and an angle'),
-                                  ('e.unv', UNV.replace('115', '116'), 'FE descriptor 116')):
+                                  ('e.unv', UNV.replace('115', '116'), 'FE descriptor 116'), ('s.unv', UNV.replace('115', '118'), 'gmsh '),
+                                  ('n.inp', FLAT.replace('*Element', '*Ngen, nset=more\n1, 3, 1\n*Element'), 'line 10: *NGEN')):
             self.assertIn(words, self.convert(name, text, status=1))
         self.assertIn('has groups of its own', self.convert('f.inp', FLAT, '--groups', 'x', status=1))
         self.assertFalse(os.path.exists(self.path('m.msh.partial')))

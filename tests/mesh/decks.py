@@ -218,7 +218,7 @@ class Decks(Case):
     @unittest.skipUnless(CCX, 'no ccx (Debian package calculix-ccx): the decks are not compared with CalculiX')
     def test_calculix(self):
         """Thirteen decks: displacements of every node within 0.5 % of the largest; what differs by more has its reason beside it."""
-        wide = {'punch': 0.01}  # the edge of a punch between nodes: CalculiX's own node-to-surface contact differs from its surface-to-surface by 0.6 %
+        wide = {'punch': 0.02}  # the edge of a punch between nodes: CalculiX's own node-to-surface contact differs from its surface-to-surface by 0.6 %
         for name, text in flat_decks().items():
             with self.subTest(deck=name):
                 left, folder = self.convert(name, text)
@@ -276,7 +276,7 @@ class Decks(Case):
             with open(self.path('draft.inp'), encoding='ascii') as file:
                 self.assertTrue(file.read().splitlines()[int(number) - 1].upper().startswith('*' + word), line)
         self.assertEqual({re.search(r'\*(\w+)', line)[1] for line in left}, {'ELEMENT', 'STEP', 'FRICTION', 'EQUATION', 'SPRING'})
-        self.assertRegex(draft, r'(?m)^  down_up: \{type: surface, slave: DOWN, master: UP.*# friction: 0.2')
+        self.assertRegex(draft, r'(?m)^  down_up: \{type: mortar, slave: DOWN, master: UP.*# friction: 0.2')
         error, _ = self.convert('draft', text, status=1)
         self.assertIn('scene.yaml is there already', error)
         checked = self.run_raw('check', '-scene', folder)
@@ -449,6 +449,123 @@ class Decks(Case):
             with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
                 self.assertIn(words, file.read())
             shutil.rmtree(folder)
+
+    def force(self, name, text, *options):
+        """What is not converted, the draft, and the force of the contacts."""
+        shutil.rmtree(self.path(name), ignore_errors=True)
+        left, folder = self.convert(name, text, 0, *options)
+        with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
+            return left, file.read(), self.solve(folder).total_contact_force
+
+    def test_unknown(self):
+        """Nothing is silent: a keyword that the reader does not know, and each parameter and value of those that it reads which its table has not, are listed with file and line;
+        of the table's keywords each has a reader; what makes nodes and elements is refused."""
+        a, b = Box('A', 'C3D8', (0, 0, 0), (1, 1, 1), (1, 1, 1)), Box('B', 'C3D8', (0, 0, 1), (1, 1, 2), (1, 1, 1), 1001)
+        good = deck([a, b], pair('B_SZ0', 'A_SZ1') + SYMMETRY + 'A_Z0, 3, 3\n', [('', '*STATIC\n*DSLOAD\nB_SZ1, P, 30.\n')])
+        self.assertEqual(self.convert('known', good)[0], [])
+        with open(self.path('more.inc'), 'w', encoding='ascii') as file:
+            file.write('** two lines\n*QUIVER, STRENGTH=3\n1., 2.\n')
+        odd = {'*QUIVER': ('*STEP', '*INCLUDE, INPUT=more.inc\n*STEP'), '*STEP, WOBBLE=2': ('*STEP', '*STEP, WOBBLE=2'), '*STATIC, RIKS': ('*STATIC', '*STATIC, RIKS'),
+               '*DSLOAD, ORIENTATION=TURNED': ('*DSLOAD', '*DSLOAD, ORIENTATION=TURNED'), '*BOUNDARY, PHANTOM=EDGE': ('*BOUNDARY', '*BOUNDARY, PHANTOM=EDGE'),
+               '*CONTACT PAIR, SMOOTH=0.2': ('SURFACE TO SURFACE', 'SURFACE TO SURFACE, SMOOTH=0.2'), '*ELASTIC, MODULI=LONG TERM': ('*ELASTIC', '*ELASTIC, MODULI=LONG TERM'),
+               '*SOLID SECTION, STIFFENED': ('*SOLID SECTION,', '*SOLID SECTION, STIFFENED,'), '*NSET of NOWHERE': ('*STEP', '*NSET, NSET=SOME\nNOWHERE, 3\n*STEP'),
+               '*ELSET, EXCEPT=A': ('*ELSET,', '*ELSET, EXCEPT=A,'), '*DENSITY that depends': ('*ELASTIC', '*DENSITY\n7.8, 20.\n7.6, 300.\n*ELASTIC'),
+               '*RESTART, READ': ('*STEP', '*RESTART, READ\n*STEP'), '*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR': ('=LINEAR', '=TABULAR'), '*MPC': ('*STEP', '*MPC\nPLANE, 1, 2, 3\n*STEP')}
+        for words, (old, new) in odd.items():
+            shutil.rmtree(self.path('odd'), ignore_errors=True)
+            left, _ = self.convert('odd', good.replace(old, new, 1))
+            self.assertEqual(len(left), 1, left)
+            self.assertRegex(left[0], ('more.inc, line 2: ' if words == '*QUIVER' else r'^ *line \d+: ') + re.escape(words))
+        for new, words in (('*NGEN, NSET=A_N\n1, 3, 1\n', 'line 3: *NGEN'), ('*NODE, SYSTEM=C\n99, 1., 0., 0.\n', 'line 3: *NODE, SYSTEM=C'), ('*SURFACE, NAME=S, COMBINE=DIFFERENCE\nA, B\n', 'line 3: *SURFACE, COMBINE')):
+            self.assertIn(words, self.convert('made', good.replace('*NODE', new + '*NODE', 1), 1)[0])
+        sys.path.insert(0, os.path.dirname(CONVERT))
+        import deck as reader, keywords  # pylint: disable=import-outside-toplevel,import-error
+        lost = [word for word in keywords.READ if not hasattr(reader.Draft, 'on_' + re.sub(r'\W', '_', word).lower())]
+        self.assertEqual(lost, ['KINEMATIC', 'RESTART'])  # the first is read with *COUPLING, of the second no parameter changes the mechanics
+
+    def test_included(self):
+        """Data lines in an *INCLUDE, or INPUT=, belong to the keyword before it: supports and forces as cgx writes them; names in quotes with blanks and commas; a file of a file."""
+        a = Box('A', 'CPS4', (0, 0), (1, 1), (1, 1))
+        text = deck([a], '*BOUNDARY\n*INCLUDE, INPUT=base.bou\n', [('', '*STATIC\n*CLOAD\n*INCLUDE, INPUT=top.cld\n')]).replace('*NSET, NSET=NALL\n', '*NSET, NSET="the top, in all"\n*INCLUDE, INPUT=top.nam\n*NSET, NSET=NALL\n')
+        nodes, _, rest = text.partition('*ELEMENT')
+        for name, rows in (('base.bou', '** of a mesher\n1, 1, 2\n*INCLUDE, INPUT=more.bou\n'), ('more.bou', '3, 2\n'), ('top.nam', '2, 4\n'), ('top.cld', '"the top, in all", 2, -5.\n'), ('nodes.txt', nodes.partition('NSET=A_N\n')[2])):
+            with open(self.path(name), 'w', encoding='ascii') as file:
+                file.write(rows)
+        left, folder = self.convert('cgx', '*HEADING\n*NODE, NSET=A_N, INPUT=nodes.txt\n*ELEMENT' + rest.replace('0.3\n', '0.\n'))
+        self.assertEqual(left, [])
+        s = self.solve(folder)
+        np.testing.assert_allclose(sorted(s.displacement[:, 1]), [-10 / 210000, -10 / 210000, 0, 0], atol=1e-18)
+
+    def test_moved(self):
+        """*CONTACT PAIR, ADJUST moves slave nodes onto the master: those nearer than the distance, those that overlap, or those of a set, also the middle ones; others stay. In the second
+        order too: the compression of the bodies as they then are."""
+        hold = SYMMETRY + 'A_Z0, 3, 3\n'
+        for kind, gap, given, height in (('C3D8', 0.05, '0.1', 2.05), ('C3D8', -0.02, '0.', 1.98), ('C3D20', 0.05, 'B_Z0', 2.05), ('C3D8', 0.05, '0.04', 0), ('C3D8', 0.05, 'B_Z1', 0)):
+            a, b = Box('A', kind, (0, 0, 0), (1, 1, 1), (1, 1, 1)), Box('B', kind, (0, 0, 1 + gap), (1, 1, 2 + gap), (2, 2, 1), 1001)
+            if kind == 'C3D20':
+                a.second(), b.second()
+            given = f'ADJUST={given}'
+            text = deck([a, b], HARD + f'*CONTACT PAIR, INTERACTION=SI, {given}\nB_SZ0, A_SZ1\n' + hold, [('', '*STATIC\n*BOUNDARY\nB_Z1, 3, 3, -0.04\n')], STEEL.replace('0.3', '0.'))
+            left, draft, force = self.force('adjusted', text)
+            self.assertEqual(left, [])
+            self.assertRegex(draft, r'line \d+: \*CONTACT PAIR, ADJUST: ' + (r'(\d+) of \1 ' if height else '0 of'))
+            self.near(force, 210000 * 0.04 / height if height else 0, 1e-9, given)
+
+    def test_skins(self):
+        """Surfaces of a set of elements without sides, as slave and as master, in a contact and in a tie, become the facets that face the other one, past a hole whose wall looks the same way and a
+        corner of the other body; so do sides that go round an edge. Surfaces to each other are mortars, nodes to a surface not."""
+        low, top = Box('A', 'CPE4', (0, 0), (4, 1), (8, 2)), Box('B', 'CPE4', (0, 1), (2, 3), (6, 6), 1001)
+        top.elements = {e: c for e, c in top.elements.items() if e not in (1001 + 14, 1001 + 15, 1001 + 20, 1001 + 21)}  # a hole
+        more = '*SURFACE, NAME=SKIN, TYPE=ELEMENT\nB,\n*SURFACE, NAME=HULL, TYPE=ELEMENT\nA\n*SURFACE, NAME=ROUND, TYPE=ELEMENT\n' + ''.join(f'_B_{side}, S{top.sides[side][2]}\n' for side in top.sides)
+        steps = [('', '*STATIC\n*BOUNDARY\nB_Y1, 1, 1\nB_Y1, 2, 2, -0.01\n')]
+
+        def text(slave, master, kind):
+            return deck([low, top], more + pair(slave, master, kind) + '*BOUNDARY\nA_Y0, 1, 2\n', steps)
+
+        for kind, word in (('NODE TO SURFACE', 'surface'), ('SURFACE TO SURFACE', 'mortar')):
+            _, draft, expected = self.force('sides', text('B_SY0', 'A_SY1', kind))
+            self.assertGreater(expected, 100)
+            for slave, master in (('SKIN', 'A_SY1'), ('B_SY0', 'HULL'), ('SKIN', 'HULL'), ('ROUND', 'HULL')):
+                _, draft, force = self.force('sides', text(slave, master, kind))
+                self.assertIn(f'type: {word}, slave: {slave}, master: {master}', draft)
+                self.near(force, expected, 1e-9, (slave, master, kind))
+        a, b = Box('A', 'C3D8', (0, 0, 0), (1, 1, 1), (2, 2, 2)), Box('B', 'C3D8', (0, 0, 1), (1, 1, 2), (3, 3, 2), 1001)
+        glued = '*SURFACE, NAME=SKIN, TYPE=ELEMENT\nB,\n*TIE, NAME=GLUE\nSKIN, A_SZ1\n*BOUNDARY\nA_Z0, 1, 3\n'
+        left, folder = self.convert('stuck', deck([a, b], glued, [('', '*STATIC\n*DSLOAD\nSKIN, P, 7.\nB_SZ1, P, 3.\n')]))  # a pressure on the whole skin stays there
+        self.assertEqual(left, [])
+        self.near(sum(np.array(r['force']) for r in self.solve(folder).reactions if r['group'] == 'A_Z0')[2], 3, 1e-9)
+
+    def test_laws(self):
+        """Of several *PLASTIC, RATE= tables that of the lowest rate is taken, in any order, and the others are listed; the penalty of a tied interaction gets the note of LINEAR."""
+        a, b = Box('A', 'C3D8', (0, 0, 0), (1, 1, 1), (1, 1, 1)), Box('B', 'C3D8', (0, 0, 1), (1, 1, 2), (1, 1, 1), 1001)
+        slow, fast = '*PLASTIC, RATE=0.\n5., 0.\n6., 0.1\n', '*PLASTIC, RATE=1.\n15., 0.\n16., 0.1\n'
+        for k, (materials, count) in enumerate(((STEEL + slow + fast, 1), (STEEL + fast + slow, 1), (STEEL + slow, 0))):
+            left, folder = self.convert(f'rate{k}', deck([a, b], SYMMETRY, [('', '*STATIC\n')], materials))
+            self.assertEqual([('*PLASTIC, RATE=1' in line) for line in left], count * [True])
+            with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
+                self.assertIn('yield: 5, hardening: 10', file.read())
+        for slope, soft in (('5.e7', False), ('5.e4', True)):
+            left, folder = self.convert('tied' + slope, deck([a, b], pair('B_SZ0', 'A_SZ1').replace('LINEAR\n5.e7', 'TIED\n' + slope) + SYMMETRY, [('', '*STATIC\n')]))
+            with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
+                self.assertRegex(file.read(), r'#   line \d+: \*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TIED: ' + ('' if soft else 'taken as a penalty'))
+            self.assertEqual(len(left), soft)
+
+    def test_planes(self):
+        """Plane cells in the planes xz and yz are turned into xy, with their supports and loads: a bar under its weight and a force."""
+        expected = None
+        for axes in ((0, 1), (0, 2), (1, 2)):
+            a = Box('A', 'CPS4', (0, 0), (1, 2), (1, 2))
+            x = np.zeros_like(a.x)
+            x[:, axes] = a.x[:, :2]
+            a.x, (c, d) = x, (axes[0] + 1, axes[1] + 1)
+            way = ', '.join('-1.' if k == d else '0.' for k in (1, 2, 3))
+            text = deck([a], f'*BOUNDARY\nA_Y0, {d}, {d}\n1, {c}, {c}\n', [('', f'*STATIC\n*CLOAD\nA_Y1, {d}, -1.\n*DLOAD\nA, GRAV, 3., {way}\n')], STEEL + '*DENSITY\n2.\n')
+            left, folder = self.convert('plane' + str(d + c), text)
+            self.assertEqual(left, [])
+            u = self.solve(folder).displacement
+            expected = u if expected is None else expected
+            np.testing.assert_allclose(u, expected, atol=1e-14 * np.abs(u).max())
+        self.near(u[:, 1].min(), -(2 * 2 + 3 * 2 * 2 ** 2 / 2) / 210000, 0.02)
 
     def test_page(self):
         """docs/convert.md: the commands of the worked deck, and what they print."""

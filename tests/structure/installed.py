@@ -49,7 +49,7 @@ class Installed(unittest.TestCase):
         """Command, headers, manual pages, documents and scripts are installed."""
         for pattern in ('bin/hyco', 'include/hyco.h', 'share/man/man1/hyco.1', 'share/man/man1/hyco-predict.1',
                         'share/bash-completion/completions/hyco', 'share/doc/hyco/LICENSE', 'share/doc/hyco/docs/scenes.md',
-                        'share/doc/hyco/docs/tutorial/solution.png', 'share/doc/hyco/scripts/plot', 'share/doc/hyco/scripts/convert', 'share/doc/hyco/scripts/deck.py',
+                        'share/doc/hyco/docs/tutorial/solution.png', 'share/doc/hyco/scripts/plot', 'share/doc/hyco/scripts/convert', 'share/doc/hyco/scripts/deck.py', 'share/doc/hyco/scripts/keywords.py',
                         'share/doc/hyco/examples/rope/scene.yaml', 'share/hyco/report.schema.json', 'share/doc/hyco/docs/report.schema.json', 'share/doc/hyco/examples/ladder/Makefile'):
             self.assertTrue(self.found(pattern), pattern)
         self.assertFalse(self.found('**/private'))
