@@ -155,6 +155,15 @@ static inline PetscReal HycoBodiesValue(PetscInt variable, PetscReal x)
   return variable == HYCO_BODIES_RECIPROCAL ? -1 / x : x;
 }
 
+/* The rigid motions of bodies that contact alone holds, where the shape of one changes: a table over the variables of theta.
+   Of each motion the coefficients (HycoRigidRow()) of the one that moves its pin by 1 and no other one, then of each body
+   and load the sums of the load times those rows, 6 numbers each, about the centre and by the size of the body. */
+typedef struct {
+  PetscInt *n_nodes, *body; /* values of each theta; by motion: the body that it moves */
+  PetscReal *node, *frame;  /* the values; by body: 3 of its centre, its size */
+  HycoGridField table;      /* no rows: no shape of such a body changes */
+} HycoBodiesMotions;
+
 typedef struct _n_HycoSubstructures {
   PetscInt dim, n;      /* bodies */
   PetscInt n_variables; /* of the scene: its parameters, the time and tables of a history */
@@ -172,6 +181,7 @@ typedef struct _n_HycoSubstructures {
   PetscInt ni, *inner_start, *inner; /* the same for the unknowns inside: those of the cells that the scene's outputs
                                         need, if they are few, and of the cells with the largest stresses */
   PetscInt p;                        /* rigid motions that contact alone prevents */
+  HycoBodiesMotions motions;
   /* loads: c = A (the turned loads at r unknowns of the cells of `probe`) */
   HycoMesh probe;
   PetscInt *cell; /* by body: a cell of `probe`, whose nodes and moduli show where and how stiff the body is */
@@ -240,6 +250,10 @@ typedef struct _n_HycoBodiesWork {
 PetscErrorCode HycoBodiesDestroy(HycoSubstructures *bodies);
 /* Points the bodies' tensors to the values of theta. */
 void HycoBodiesSetTensors(HycoSubstructures bodies);
+/* Points the table of the motions to its values. */
+void HycoBodiesSetMotions(HycoSubstructures bodies);
+/* The rows of the rigid motions of body k for component c at X, in its own axes. */
+void HycoBodiesRigidRow(HycoSubstructures bodies, PetscInt k, const PetscReal X[3], PetscInt c, PetscReal row[6]);
 /* Whether axis p of theta changes the shape of body k. */
 static inline PetscBool HycoBodiesAxis(HycoSubstructures bodies, PetscInt k, PetscInt p)
 {
@@ -349,6 +363,8 @@ PetscErrorCode HycoBodiesRows(HycoBodiesWork work, PetscInt k, PetscInt n, Petsc
 PetscErrorCode HycoBodiesAddRows(HycoBodiesWork work, PetscInt k, const PetscReal share_a[], const PetscReal share_H[],
                                  const PetscReal x[], const PetscReal f[], PetscReal row[]);
 PetscErrorCode HycoBodiesForgetBeside(HycoBodiesWork work);
+/* Z and work of the bodies in the table of motions, at mu, where the surface's nodes are (NULL: Z stays). */
+PetscErrorCode HycoBodiesMoveMotions(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal mu[]);
 /* The derivatives of the displacements u[nd] of the points' cells, as HycoBodiesSlope(), with those of inelastic strains. */
 PetscErrorCode HycoBodiesCellsSlope(HycoBodiesWork work, PetscInt n, const PetscInt contact[],
                                     const PetscReal weight[2], const PetscInt point[2], const PetscReal dz[],

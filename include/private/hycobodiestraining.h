@@ -136,6 +136,8 @@ PetscErrorCode HycoBodiesCondense(HycoReducer reducer, HycoBodiesFactor *factor,
 PetscErrorCode HycoBodiesLoads(HycoReducer reducer, HycoBodiesFactor *factor);
 /* The values of theta and the bodies' samples there. Collective. */
 PetscErrorCode HycoBodiesSample(HycoReducer reducer, HycoBodiesFactor *factor);
+/* The table of the rigid motions, if the shape of a body that contact alone holds changes; after the samples. Collective. */
+PetscErrorCode HycoBodiesTakeMotions(HycoReducer reducer, HycoBodiesFactor *factor);
 /* Raises factor->score by the stresses of the displacements u (n_dof of the part, without prescribed ones) relative to
    the largest in their body. Collective. */
 PetscErrorCode HycoBodiesAddScores(HycoReducer reducer, HycoBodiesFactor *factor, const PetscReal u[]);

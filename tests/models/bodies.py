@@ -153,6 +153,42 @@ Physical Surface("below") = {1}; Physical Surface("above") = {2}; Physical Curve
 Physical Curve("sole") = {5}; Physical Curve("press") = {7};
 """)
 
+RECTANGLE = """Macro Quad
+p = newp; Point(p) = {x0, y0, 0}; Point(p + 1) = {x1, y0, 0}; Point(p + 2) = {x1, y1, 0}; Point(p + 3) = {x0, y1, 0};
+l = newl; Line(l) = {p, p + 1}; Line(l + 1) = {p + 1, p + 2}; Line(l + 2) = {p + 2, p + 3}; Line(l + 3) = {p + 3, p};
+c = newll; Curve Loop(c) = {l : l + 3}; s = news; Plane Surface(s) = {c};
+Transfinite Curve{l, l + 2} = nx + 1; Transfinite Curve{l + 1, l + 3} = ny + 1; Transfinite Surface{s}; Recombine Surface{s};
+Return
+"""
+# a foot that a bed alone holds in its height; a blunt wedge that two slopes hold in all three motions
+FOOT = ("""scene: {title: a foot of changing height, mesh: foot.msh, parameters: [height, lean, load]}
+parameter: {height: {range: [12, 20]}, lean: {range: [0, 2]}, load: {range: [20, 200]}}
+body:
+  foot: {young: 2.1e5, poisson: 0.3, map: {x: "x*(1 + 0.1*y/16) + lean*y/16", y: "y*height/16 + 0.05*(x/10)^2*(1 - y/16)"}}
+  bed: {young: 3e4, poisson: 0.25}
+fixed: {top: {x: 0}, base: {x: 0, y: 0}}
+traction: {top: {y: "-load*(1 + 0.2*x/10)"}}
+contact: {sole: {type: mortar, slave: under, master: bed_top}}
+output: {push: {force: y, contact: sole}, tilt: {moment: z, contact: sole}, side: {reaction: x, group: top}}
+""", RECTANGLE + """x0 = -10; x1 = 10; y0 = 0; y1 = 16; nx = 12; ny = 6; Call Quad;
+Physical Surface("foot") = {s}; Physical Curve("under") = {l}; Physical Curve("top") = {l + 2};
+x0 = -16; x1 = 16; y0 = -8; y1 = 0; nx = 18; ny = 4; Call Quad;
+Physical Surface("bed") = {s}; Physical Curve("base") = {l}; Physical Curve("bed_top") = {l + 2};
+""")
+WEDGE = ("""scene: {title: a wedge on two slopes, mesh: wedge.msh, parameters: [angle, width]}
+parameter: {angle: {range: [5, 20]}, width: {range: [0.9, 1.1]}}
+body:
+  wedge: {young: 2e5, poisson: 0.3, map: {x: "x*width", y: "y + (1 - y/8)*(abs(x)*width - 9)*tan(angle*pi/180)"}}
+  left: {young: 7e4, poisson: 0.3, map: {y: "y + (1 + y/6)*(-x - 9)*tan(angle*pi/180)"}}
+  right: {young: 7e4, poisson: 0.3, map: {y: "y + (1 + y/6)*(x - 9)*tan(angle*pi/180)"}}
+fixed: {left_base: {x: 0, y: 0}, right_base: {x: 0, y: 0}}
+traction: {wedge_top: {y: "-90*(1 + 0.3*x/12)"}}
+contact: {l: {type: surface, slave: wedge_base, master: left_top}, r: {type: surface, slave: wedge_base, master: right_top}}
+output: {up_l: {force: y, contact: l}, up_r: {force: y, contact: r}, tilt_l: {moment: z, contact: l}, tilt_r: {moment: z, contact: r}}
+""", RECTANGLE + ''.join(f'x0 = {x}; x1 = {X}; y0 = {y}; y1 = {Y}; nx = {n}; ny = 4; Call Quad;\nPhysical Surface("{b}") = {{s}}; '
+                         f'Physical Curve("{b}_base") = {{l}}; Physical Curve("{b}_top") = {{l + 2}};\n'
+                         for b, x, X, y, Y, n in (('wedge', -12, 12, 0, 8, 18), ('left', -14, -4, -6, 0, 9), ('right', 4, 14, -6, 0, 8))))
+
 
 class Bodies(Case):
     @classmethod
@@ -348,6 +384,29 @@ class Bodies(Case):
         self.drawn('many', 2, SHORT[1].replace('Curve{5:8} = 5', 'Curve{5, 7} = 101; Transfinite Curve{6, 8} = 5'),
                    scene + 'pressure: {press: press*(1 + tip*x)}\n')
         self.judge('many', ('-values_press', '1.7,4.2', '-values_tip', '-1.8,0.3,1.1'), u=1e-3, model='many.h5')
+
+    def test_reshaped(self):
+        """Bodies that contact alone holds, of which parameters change height, lean, angle and width: forces within the bound, those that balance
+        the loads to round-off, and derivatives as differences of predictions."""
+        for name, (scene, geo), mu in (('foot', FOOT, (14.3, 1.3, 120)), ('wedge', WEDGE, (13.1, 1.07))):
+            with self.subTest(name=name):
+                self.drawn(name, 2, geo, scene)
+                self.judge(name, ('-scatter', '8,4'), train=('-scatter', '4'), forces=1e-4, u=1e-2, options=('-hyco_bodies_samples', '30'))
+                at = lambda point, *more: self.hyco('predict', '-model', 'm.h5', '-mu', ','.join(map(repr, point)), *more)
+                p = at(mu, *(['-gradient'] if name == 'foot' else []))
+                if name == 'foot':
+                    half = 10*1.1
+                    self.near(p['outputs']['push'], 2*half*mu[2]*(1 + 0.2*mu[1]/10), 1e-12)
+                    # about the origin, of load*(1 + 0.02 x) over the top, -11 + lean to 11 + lean, and of the support there
+                    self.near(p['outputs']['tilt'], mu[2]*(2*half*mu[1] + 0.02*(2*half*mu[1]**2 + 2*half**3/3)) + mu[0]*p['outputs']['side'], 1e-12)
+                else:
+                    self.near(p['outputs']['up_l'] + p['outputs']['up_r'], 90*24*mu[1], 1e-12)
+                for i, parameter in enumerate(p['gradient']['push'] if name == 'foot' else ()):
+                    step = 1e-4*mu[i]
+                    b, a = (at([v + s*step*(i == k) for k, v in enumerate(mu)])['outputs'] for s in (1, -1))
+                    for output in p['outputs']:
+                        self.assertLess(abs(p['gradient'][output][parameter] - (b[output] - a[output])/(2*step)),
+                                        1e-5*abs(p['outputs'][output])/abs(mu[i]))
 
     def test_obstacle(self):
         """One body under an obstacle that moves, on springs that soften with it."""

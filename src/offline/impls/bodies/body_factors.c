@@ -108,31 +108,22 @@ static PetscErrorCode SharePins(HycoSubstructures b, HycoBodiesFactor *factor)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The isostatic supports are the same at all samples: their motions are unknowns. Collective. */
+/* The isostatic supports are the same at all samples, because their motions are unknowns, whatever a new choice would
+   be. Collective. */
 static PetscErrorCode TakePins(HycoReducer t, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
-  PetscBool same = PETSC_TRUE;
-  PetscInt *pins, kernel;
+  PetscInt kernel;
 
   PetscFunctionBegin;
   PetscCall(HycoKernelSize(factor->fom->K, &kernel));
-  /* The first factor decides; later samples must have the same motions, because Z and the work are interpolated
-     entry by entry. */
   if (!factor->pins) b->p = kernel;
   HycoCheckModel(kernel == b->p, "the number of rigid motions that contact alone prevents changes with the parameters, "
                                  "which a model of bodies does not support; train a hybrid model");
-  PetscCall(PetscMalloc1(b->p + 1, &pins));
-  PetscCall(HycoKernelPins(factor->fom->K, b->p, pins));
-  if (!factor->pins) {
-    factor->pins = pins;
-    PetscCall(SharePins(b, factor));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  for (PetscInt i = 0; i < b->p; i++) same = (PetscBool)(same && pins[i] == factor->pins[i]);
-  PetscCall(PetscFree(pins));
-  HycoCheckModel(same, "a body that contact alone holds changes its shape so that its rigid motions need other "
-                       "unknowns, which a model of bodies does not support; train a hybrid model");
+  if (factor->pins) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(b->p + 1, &factor->pins));
+  PetscCall(HycoKernelPins(factor->fom->K, b->p, factor->pins));
+  PetscCall(SharePins(b, factor));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

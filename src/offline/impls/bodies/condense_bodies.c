@@ -418,6 +418,7 @@ static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFac
   PetscCall(HycoBodiesLoads(t, factor));
   PetscCall(HycoBodiesBeginKeys(t, factor));
   PetscCall(HycoBodiesSample(t, factor));
+  PetscCall(HycoBodiesTakeMotions(t, factor));
   if (HycoBodiesFlow(t)) PetscCall(HycoBodiesStrains(t, factor));
   PetscCall(HycoBodiesFields(t, store, factor));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -311,6 +311,33 @@ static PetscErrorCode MoveBody(HycoH5 h, const char model[], HycoSubstructures b
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The table of the rigid motions, if there is one. */
+static PetscErrorCode MoveMotions(HycoROM model, HycoH5 h, HycoSubstructures b)
+{
+  HycoBodiesMotions *m = &b->motions;
+  PetscInt nodes = 0, all = 1;
+
+  PetscFunctionBegin;
+  if (HycoH5Reads(h) ? !HycoH5Has(h, "bodies/motions/table") : !m->table.rows) PetscFunctionReturn(PETSC_SUCCESS);
+  m->table.rows = 6 * (b->p + b->n * b->r);
+  PetscCall(HycoH5Int(h, "bodies/motions/n_nodes", 1, PETSC_MAX_INT / 64, &b->n_theta, 1, &m->n_nodes));
+  for (PetscInt p = 0; p < b->n_theta; p++) {
+    nodes += m->n_nodes[p];
+    all *= m->n_nodes[p];
+  }
+  PetscCall(HycoH5Int(h, "bodies/motions/body", 0, b->n - 1, &b->p, 1, &m->body));
+  PetscCall(HycoH5Real(h, "bodies/motions/node", &nodes, 1, &m->node));
+  PetscCall(HycoH5Real(h, "bodies/motions/frame", &b->n, 4, &m->frame));
+  PetscCall(HycoH5Real(h, "bodies/motions/table", &all, m->table.rows, &m->table.data));
+  HycoBodiesSetMotions(b);
+  for (PetscInt p = 0; p < b->n_theta; p++) {
+    for (PetscInt i = 1; i < m->n_nodes[p]; i++)
+      HycoCheck(m->table.tensor.x[p][i] > m->table.tensor.x[p][i - 1], "%s: bodies/motions/node is damaged",
+                model->model->path);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* What is inelastic. Written and read by one function; in->fields has the responses of all bodies, samples and turns,
    one below the other. */
 static PetscErrorCode MoveInelastic(HycoROM m, HycoH5 h)
@@ -366,6 +393,7 @@ PetscErrorCode HycoBodiesFile(HycoROM m, HycoH5 h)
   PetscCall(MoveTheta(h, m, b));
   PetscCall(MoveProbe(h, m, b));
   for (PetscInt k = 0; k < b->n; k++) PetscCall(MoveBody(h, m->model->path, b, k));
+  PetscCall(MoveMotions(m, h, b));
   if (m->model->scene->n_times) PetscCall(MoveInelastic(m, h));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -83,21 +83,23 @@ PetscErrorCode HycoBodiesJacobian(HycoROM m, PetscInt k, const PetscInt contact[
 struct _n_HycoBodiesBeside {
   HycoBodiesWork at; /* the data at the last such point */
   PetscInt n_weights, size;
-  PetscReal *change[5]; /* by point; 0: sums of them. c, 1 for each body's kappa, 9 for its turn, its weights, f */
+  PetscReal *change[5]; /* by point; 0: sums of them. c, 1 for each body's kappa, 9 for its turn, its weights,
+                           Z x, f */
   PetscReal *du;        /* surfaces, then inside */
 };
 
 /* The parts of a change. */
 typedef struct {
-  const PetscReal *c, *kappa, *turn, *weight, *f;
+  const PetscReal *c, *kappa, *turn, *weight, *z, *f;
 } Parts;
 
 static Parts PartsOf(const HycoBodiesWork o, const PetscReal change[])
 {
   const HycoSubstructures b = o->bodies;
-  const PetscReal *kappa = change + b->r, *turn = kappa + b->n, *weight = turn + 9 * b->n;
+  const PetscReal *kappa = change + b->r, *turn = kappa + b->n, *weight = turn + 9 * b->n,
+                  *z = weight + o->beside->n_weights;
 
-  return (Parts){change, kappa, turn, weight, weight + o->beside->n_weights};
+  return (Parts){change, kappa, turn, weight, z, z + b->ns};
 }
 
 /* NULL-safe. */
@@ -126,7 +128,7 @@ static PetscErrorCode MakeBeside(HycoROM m, HycoBodiesSurface s)
   made = o->beside;
   PetscCall(PetscNew(&made->at));
   for (PetscInt k = 0; k < b->n; k++) made->n_weights += b->body[k].n_samples;
-  made->size = b->r + 10 * b->n + made->n_weights + b->ns;
+  made->size = b->r + 10 * b->n + made->n_weights + 2 * b->ns;
   for (PetscInt k = 0; k < 5; k++) PetscCall(PetscCalloc1(made->size, &made->change[k]));
   PetscCall(PetscMalloc1(b->ns + b->ni + 1, &made->du));
   /* Room for any number of contacts: gradients differ in theirs. */
@@ -153,7 +155,7 @@ static void AddRowProducts(PetscInt n, PetscInt m, const PetscReal A[], const Pe
   }
 }
 
-/* The part of a change that the weights of body k have: du += (R' c - C' f) / kappa + Z' x. */
+/* The part of a change that the weights of body k have: du += (R' c - C' f) / kappa. */
 static PetscErrorCode AddWeighted(HycoBodiesWork o, PetscInt k, const PetscReal weight[], PetscReal du[])
 {
   const HycoSubstructures b = o->bodies;
@@ -162,14 +164,12 @@ static PetscErrorCode AddWeighted(HycoBodiesWork o, PetscInt k, const PetscReal 
   PetscReal *blend, *share, *f;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc3(n * PetscMax(b->r, b->p) + 1, &blend, own->C.n_terms + 1, &share, n + 1, &f));
+  PetscCall(PetscMalloc3(n * b->r + 1, &blend, own->C.n_terms + 1, &share, n + 1, &f));
   PetscCall(HycoBodiesBlend(own->n_samples, weight, n * b->r, own->R, blend));
   AddRowProducts(n, b->r, blend, o->c, 1 / o->kappa[k], du);
   HycoFlexibilityShares(&own->C, own->n_samples, weight, share);
   for (PetscInt i = 0; i < n; i++) f[i] = -o->f[b->start[k] + i] / o->kappa[k];
   PetscCall(HycoFlexibilityMultiply(&own->C, share, f, du));
-  PetscCall(HycoBodiesBlend(own->n_samples, weight, n * b->p, own->Z, blend));
-  AddRowProducts(n, b->p, blend, o->x, 1, du);
   PetscCall(PetscFree3(blend, share, f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -195,6 +195,7 @@ static PetscErrorCode AddDisplacements(HycoBodiesWork o, const Parts *change, Pe
     }
     if (AnyOf(b->body[k].n_samples, weight)) PetscCall(AddWeighted(o, k, weight, u));
   }
+  for (PetscInt i = 0; i < b->ns; i++) du[i] += change->z[i];
   PetscCall(HycoBodiesYield(o, change->f, du));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -212,6 +213,11 @@ static void TakeChange(HycoBodiesWork o, PetscInt n, const PetscInt contact[], P
   for (PetscInt k = 0; k < 9 * b->n; k++) *to++ = at->pose[k / 9].Q[k % 9] - o->pose[k / 9].Q[k % 9];
   for (PetscInt k = 0; k < b->n; k++) {
     for (PetscInt j = 0; j < b->body[k].n_samples; j++) *to++ = at->weight[k][j] - o->weight[k][j];
+  }
+  for (PetscInt i = 0; i < b->ns; i++) {
+    *to = 0;
+    for (PetscInt j = 0; j < b->p; j++) *to += (at->Z[i * b->p + j] - o->Z[i * b->p + j]) * o->x[j];
+    to++;
   }
   for (PetscInt i = 0; i < b->ns; i++) to[i] = 0;
   for (PetscInt k = 0; k < n && rows; k++) {
@@ -242,6 +248,8 @@ PetscErrorCode HycoBodiesNearSurface(HycoROM m, const HycoBodiesSurface *s, cons
   at = o->beside->at;
   du = o->beside->du;
   PetscCall(HycoBodiesBring(at, rows ? s : NULL, mu));
+  /* Without other rows the nodes are where they were. */
+  if (!rows) PetscCall(PetscArraycpy(at->Z, o->Z, b->ns * b->p));
   TakeChange(o, n, contact, rows, z + b->p, o->beside->change[point]);
   change = PartsOf(o, o->beside->change[point]);
   PetscCall(PetscArrayzero(du, b->ns));

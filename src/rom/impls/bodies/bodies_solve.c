@@ -57,7 +57,8 @@ PetscErrorCode HycoBodiesDestroy(HycoSubstructures *bodies)
     HycoFreeAll(&s->R, &s->Z, &s->work, &s->gram);
   }
   HycoFreeAll(&b->first, &b->theta, &b->variable, &b->n_nodes, &b->node, &b->body, &b->start, &b->dof, &b->inner_start,
-              &b->inner, &b->cell, &b->at, &b->at_body, &b->A, &b->mode_start, &b->turn_start, &b->G);
+              &b->inner, &b->cell, &b->at, &b->at_body, &b->A, &b->mode_start, &b->turn_start, &b->G,
+              &b->motions.n_nodes, &b->motions.body, &b->motions.node, &b->motions.frame, &b->motions.table.data);
   if (b->inelastic) {
     HycoBodiesInelastic s = b->inelastic;
 
@@ -973,6 +974,7 @@ static PetscErrorCode Bring(HycoBodiesWork o, const HycoBodiesSurface *s, const 
     PetscCall(TakeWeights(o, mu, alone));
     PetscCall(Place(o, mu));
     PetscCall(BlendMotions(o));
+    PetscCall(HycoBodiesMoveMotions(o, s, mu));
   } else
     PetscCall(HycoFESetParameters(o->fe, mu));
   if (forces) PetscCall(alone ? FindLoads(o) : Load(o));
