@@ -9,6 +9,9 @@ from facing import Surface, adjusted
 from keywords import PROCEDURES, WHY
 
 STRUCTURAL = re.compile(r"(S[3-9]|STRI|SAX|SC\d|CSS|M3D|SFM|B[23]|PIPE|ELBOW|T[23]D|CONN|SPRING|DASHPOT|MASS|ROTARYI|GAP|ITS|R3D|R2D|RAX|RB|D$|COH|DCOUP|F3D|U\d|MCL|CMD)")
+VARIANTS = ((r"(C3D|CP[ES]G?|CAX)\d+[A-Z]*R", "cells are fully integrated, without hourglass control"), (r"(C3D8|CP[ES]4|CAX4)I", "no incompatible modes: bending of such cells is stiffer"),
+            (r"(C3D|CP[ES]G?|CAX)\d+[A-Z]*H", "no hybrid cells: nearly incompressible ones of first order do not lock (element: bbar)"),
+            (r"(C3D|CP[ES]G?|CAX)\d+[A-Z]*M", "cells are the ordinary ones of second order"), ("CPEG", "plane strain, without strain across the plane"))
 AXES = "xyz"
 NAMED = {"ENCASTRE": (1, 2, 3, 4, 5, 6), "PINNED": (1, 2, 3), "XSYMM": (1, 5, 6), "YSYMM": (2, 4, 6), "ZSYMM": (3, 4, 5), "XASYMM": (2, 3, 4), "YASYMM": (1, 3, 5),
          "ZASYMM": (1, 2, 6), "NOWARP": (), "NOOVAL": (), "NODEFORM": ()}
@@ -216,10 +219,9 @@ class Draft:
             if structural(name):
                 self.leave(block, f"*ELEMENT, TYPE={name}", "these elements are left out; a scene has solids only" +
                            ("; a bar is a solid of its section, or spring: with EA over its length where it holds a point" if re.match(r"T[23]D", name) else ""))
-            elif re.search(r"(8|4|20)[A-Z]*R", name) and name.startswith(("C3D8R", "CPE4R", "CPS4R", "CAX4R")):
-                self.leave(block, f"*ELEMENT, TYPE={name}", "cells are fully integrated, without hourglass control")
-            elif name.startswith("C3D8I") or name in ("CPE4I", "CPS4I", "CAX4I"):
-                self.leave(block, f"*ELEMENT, TYPE={name}", "no incompatible modes: bending of such cells is stiffer")
+            for pattern, why in VARIANTS:
+                if re.match(pattern, name):
+                    self.leave(block, f"*ELEMENT, TYPE={name}", why)
         for entry in self.deck.left:
             self.leave(*entry)
         for block in self.deck.rest:
@@ -349,13 +351,17 @@ class Draft:
         sides = self.sides_of(self.m, self.kept["facet_groups"].get(name, []))
         return Surface(self.m, sides, self.dim()) if sides else None
 
+    def nodes_of(self, name):
+        """The nodes of a group of the draft, in the order of its facets."""
+        found = self.surface(name)
+        return list(dict.fromkeys(n for f in found.facets for n in f.nodes)) if found else self.kept["node_groups"].get(name, [])
+
     def adjust(self, block, slave, master):
         """*CONTACT PAIR, ADJUST: nodes of the slave nearer than a clearance, or of a set, are moved onto the master."""
-        given, (mine, other) = block.parameters["ADJUST"], (self.surface(name) for name in (slave, master))
+        given, nodes = block.parameters["ADJUST"], self.nodes_of(slave)
         near = real(given) if re.fullmatch(r"[\d.eEdD+-]+", given) else None
         chosen = set(self.nodes(given, block)) if near is None else ()
-        nodes = dict.fromkeys(n for f in mine.facets for n in f.nodes) if mine else self.kept["node_groups"][slave]
-        moved = adjusted(self.m, nodes, other, lambda n, clearance: clearance <= near if near is not None else n in chosen)
+        moved = adjusted(self.m, nodes, self.surface(master), lambda n, clearance: clearance <= near if near is not None else n in chosen)
         self.note(f"{block.place}: *CONTACT PAIR, ADJUST: {moved} of {len(nodes)} slave nodes are moved onto the master, in mesh.msh")
 
     def on_contact_inclusions(self, block):
@@ -477,7 +483,7 @@ class Draft:
                 twice = [g for g in before if g.step == now and g.value not in (None, HELD) and (g.block in self.early) == (block in self.early)]
                 if kind in ADDED and any(g.amplitude != said_now.amplitude for g in twice):
                     self.leave(block, f"*{block.word} twice in a step, with several amplitudes", "the sum is taken")
-                elif kind not in ADDED and any((g.value, g.amplitude) != (value, said_now.amplitude) for g in twice):
+                elif kind not in ADDED and any(g.value != value or value and g.amplitude != said_now.amplitude for g in twice):
                     self.leave(block, f"*{block.word} twice in a step, with several values", "the last one counts")
                 known[before] = (*kept, said_now)
             given[atom] = known[before]
@@ -752,6 +758,12 @@ class Draft:
                 del self.contacts[name]
         for kind, word in self.targets:
             self.gather(kind, word)
+        for name, (slave, master, tolerance) in self.ties.items():
+            fixed = {n for group in self.entry.get("fixed", {}) for n in self.kept["node_groups"].get(group, ())}
+            mine, others = (fixed.intersection(self.nodes_of(group)) for group in (slave, master))
+            if mine and not others and self.surface(slave):  # a tied node follows its masters, which must have its supports
+                self.ties[name] = (master, slave, tolerance)
+                self.note(f"tie {name}: slave and master are exchanged: nodes of {slave} have supports")
         self.load_bodies()
         self.soften(named)
         for kind, groups in self.kept.items():
@@ -824,7 +836,7 @@ class Draft:
         return rows if any(on for _, on in rows) else []
 
     def inelastic(self):
-        return any("plastic" in m or "creep" in m and self.creeps() for m in (self.materials.get(b[1], {}) for b in self.bodies.values()))
+        return self.formulation() != "plane_stress" and any("plastic" in m or "creep" in m and self.creeps() for m in (self.materials.get(b[1], {}) for b in self.bodies.values()))
 
     def over_time(self, parts, kind="ramp"):
         """The sum of functions of time (factor, rows) as text: numbers, and in a history factors of its tables."""
@@ -865,6 +877,9 @@ class Draft:
             out["reference_temperature"] = said(start if len(alpha) == 1 else zero)
             if len(alpha) > 1 and start != zero:
                 self.leave(source, "*EXPANSION that depends on the temperature, from an initial one that is not ZERO", "subtract its strain at the initial temperature")
+        if self.formulation() == "plane_stress" and {"plastic", "creep"} & set(m):
+            self.leave(block, f"*{' and *'.join(law.upper() for law in ('plastic', 'creep') if law in m)} in plane stress", "inelastic laws need plane strain, axisymmetry or 3D: the body is elastic")
+            m = {k: v for k, v in m.items() if k not in ("plastic", "creep")}
         creeps = "creep" in m and self.creeps()
         if creeps:
             a, n, power = m["creep"]
@@ -880,15 +895,14 @@ class Draft:
         kinds = {self.m.cells[c][0] for c in self.bodies[title][0]}
         if "law" in out and kinds & {"tri3", "tet4"}:
             out["element"] = "standard"
-        elif "law" not in out and max(n for _, n, _ in rows) > 0.49 and kinds <= {"quad4", "hex8"} and self.formulation() != "plane_stress":
-            out["element"] = "bbar"
-            self.note(f"{block.place}: {title}: nearly incompressible: its cells do not lock, as those of Abaqus; CalculiX's do (element: standard)")
+        elif kinds <= {"quad4", "hex8"} and self.formulation() != "plane_stress" and ("law" in out or max(row[1] for row in m.get("elastic", [(0, 0)])) > 0.49):
+            out.update({} if "law" in out else {"element": "bbar"})
+            self.note(f"{block.place}: {title}: {'inelastic' if 'law' in out else 'nearly incompressible'}: its cells do not lock, as those of Abaqus; CalculiX's do (element: standard)")
         return out
 
     def reach(self, slave, master):
         """How far any slave node is from the master's facets, and the shortest slave edge."""
-        mine, other = self.surface(slave), self.surface(master)
-        nodes = {n for f in mine.facets for n in f.nodes} if mine else self.m.node_groups.get(slave)
+        mine, other, nodes = self.surface(slave), self.surface(master), self.nodes_of(slave)
         if not nodes or not other:
             return None
         edges = [math.dist(self.m.nodes[a], self.m.nodes[b]) for f in (mine or other).facets for a, b in zip(f.nodes, f.nodes[1:])]  # a slave of nodes has none

@@ -90,18 +90,9 @@ class KeywordError(Exception):
     """A user's error, in one line."""
 
 
-class Block:
-    """A *KEYWORD with its parameters and rows, and where it stands."""
-
-    def __init__(self, text, file, line, main):
-        word, *rest = words_of(text[1:])
-        self.word, self.rows, self.file, self.line, self.taken = " ".join(word.upper().split()), [], file, line, True
-        self.parameters = {" ".join(k.upper().split()): v.strip() for k, _, v in (r.partition("=") for r in rest if r)}
-        self.place = f"line {line}" if file == main else f"{os.path.basename(file)}, line {line}"
-        self.instance = ""  # that of a section of a part
-
-    def __iter__(self):
-        return iter((self.word, self.parameters, self.rows))
+def solid(text):
+    """A text without blanks, which CalculiX ignores."""
+    return "".join(text.upper().split())
 
 
 def rows_of(table):
@@ -114,7 +105,26 @@ def rows_of(table):
 
 
 MESH, READ = rows_of(MESH), rows_of(READ)
+SPELLED = {solid(word): word for word in (*MESH, *READ, *QUIET, *WHY)}
 PROCEDURES = {word for word, why in WHY.items() if why.startswith("only static steps")}
+
+
+class Block:
+    """A *KEYWORD with its parameters and rows, and where it stands. Words of the table are spelled as there."""
+
+    def __init__(self, text, file, line, main):
+        word, *rest = words_of(text[1:])
+        self.word, self.rows, self.file, self.line, self.taken = SPELLED.get(solid(word), " ".join(word.upper().split())), [], file, line, True
+        known = {solid(name): (name, {solid(value): value for value in values or ()}) for name, (_, values) in {**MESH, **READ}.get(self.word, {}).items()}
+        self.parameters = {}
+        for name, _, value in (r.partition("=") for r in rest if r):
+            name, values = known.get(solid(name), (" ".join(name.upper().split()), {}))
+            self.parameters[name] = values.get(solid(value), value.strip())
+        self.place = f"line {line}" if file == main else f"{os.path.basename(file)}, line {line}"
+        self.instance = ""  # that of a section of a part
+
+    def __iter__(self):
+        return iter((self.word, self.parameters, self.rows))
 
 
 def unread(block):
@@ -125,7 +135,7 @@ def unread(block):
     listed, taken = [], True
     for name, value in block.parameters.items():
         mark, values = known.get(name, ("?", None))
-        if mark == "-" or mark == "" and values is None or values is not None and " ".join(value.upper().split()) in values:
+        if mark == "-" or mark == "" and values is None or values is not None and value in values:
             continue
         listed.append((f"*{block.word}, {name}" + (f"={value.upper()}" if value else ""), WHY.get(f"{block.word}, {name}", OTHER)))
         taken = taken and mark != "!"
@@ -141,21 +151,22 @@ def lines_of(path, main, within=()):
     """The lines of a file and, in their place, of those that it includes: (file, number, text). The line of a keyword may be continued after a comma."""
     if os.path.realpath(path) in within:
         raise KeywordError(f"{path} includes itself")
-    keyword = ""
+    keyword, start = "", 0
     with open(path, encoding="utf-8", errors="replace") as file:
         for number, line in enumerate(file, 1):
             line = line.strip()
             if line.startswith("**") or not line:
                 continue
+            start = start if keyword else number
             if line.startswith("*") or keyword:
                 keyword += line
                 if keyword.endswith(","):
                     continue
                 line, keyword = keyword, ""
             if re.match(r"\*\s*INCLUDE\s*(,|$)", line, re.I):
-                yield from lines_of(beside(path, main, Block(line, path, number, main)), main, (*within, os.path.realpath(path)))
+                yield from lines_of(beside(path, main, Block(line, path, start, main)), main, (*within, os.path.realpath(path)))
             else:
-                yield path, number, line
+                yield path, start, line
 
 
 def beside(path, main, block):

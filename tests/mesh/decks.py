@@ -465,7 +465,10 @@ class Decks(Case):
         self.assertEqual(self.convert('known', good)[0], [])
         with open(self.path('more.inc'), 'w', encoding='ascii') as file:
             file.write('** two lines\n*QUIVER, STRENGTH=3\n1., 2.\n')
-        odd = {'*QUIVER': ('*STEP', '*INCLUDE, INPUT=more.inc\n*STEP'), '*STEP, WOBBLE=2': ('*STEP', '*STEP, WOBBLE=2'), '*STATIC, RIKS': ('*STATIC', '*STATIC, RIKS'),
+        left, draft, _ = self.force('blanks', good.replace('*SOLID SECTION', '*SOLIDSECTION').replace('SURFACE TO SURFACE', 'SURFACETO SURFACE').replace('*SURFACE INTERACTION', '*surfaceinteraction'))
+        self.assertEqual(left, [])  # CalculiX ignores blanks
+        self.assertIn('type: mortar', draft)
+        odd = {'*ELEMENT, TYPE=C3D8H': ('TYPE=C3D8,', 'TYPE=C3D8H,'), '*STEP, TWO LINES=2': ('*STEP', '*STEP, INC=3,\nTWO LINES=2'), '*SURFACE of a side SPOS': ('*STEP', '*SURFACE, NAME=ODD\n1, SPOS\n*STEP'), '*QUIVER': ('*STEP', '*INCLUDE, INPUT=more.inc\n*STEP'), '*STEP, WOBBLE=2': ('*STEP', '*STEP, WOBBLE=2'), '*STATIC, RIKS': ('*STATIC', '*STATIC, RIKS'),
                '*DSLOAD, ORIENTATION=TURNED': ('*DSLOAD', '*DSLOAD, ORIENTATION=TURNED'), '*BOUNDARY, PHANTOM=EDGE': ('*BOUNDARY', '*BOUNDARY, PHANTOM=EDGE'),
                '*CONTACT PAIR, SMOOTH=0.2': ('SURFACE TO SURFACE', 'SURFACE TO SURFACE, SMOOTH=0.2'), '*ELASTIC, MODULI=LONG TERM': ('*ELASTIC', '*ELASTIC, MODULI=LONG TERM'),
                '*SOLID SECTION, STIFFENED': ('*SOLID SECTION,', '*SOLID SECTION, STIFFENED,'), '*NSET of NOWHERE': ('*STEP', '*NSET, NSET=SOME\nNOWHERE, 3\n*STEP'),
@@ -476,6 +479,9 @@ class Decks(Case):
             left, _ = self.convert('odd', good.replace(old, new, 1))
             self.assertEqual(len(left), 1, left)
             self.assertRegex(left[0], ('more.inc, line 2: ' if words == '*QUIVER' else r'^ *line \d+: ') + re.escape(words))
+            if words != '*QUIVER' and ' of ' not in words:
+                line = good.replace(old, new, 1).splitlines()[int(re.search(r'line (\d+)', left[0])[1]) - 1]
+                self.assertTrue(line.startswith(words.split(',')[0].split(' that')[0]), line)
         for new, words in (('*NGEN, NSET=A_N\n1, 3, 1\n', 'line 3: *NGEN'), ('*NODE, SYSTEM=C\n99, 1., 0., 0.\n', 'line 3: *NODE, SYSTEM=C'), ('*SURFACE, NAME=S, COMBINE=DIFFERENCE\nA, B\n', 'line 3: *SURFACE, COMBINE')):
             self.assertIn(words, self.convert('made', good.replace('*NODE', new + '*NODE', 1), 1)[0])
         sys.path.insert(0, os.path.dirname(CONVERT))
@@ -544,6 +550,12 @@ class Decks(Case):
             self.assertEqual([('*PLASTIC, RATE=1' in line) for line in left], count * [True])
             with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
                 self.assertIn('yield: 5, hardening: 10', file.read())
+        flat = Box('A', 'CPS4', (0, 0), (1, 1), (1, 1))
+        left, folder = self.convert('flat yield', deck([flat], '*BOUNDARY\nA_Y0, 1, 2\n', [('', '*STATIC\n*CLOAD\nA_Y1, 2, 3.\n')], STEEL + slow))
+        self.assertEqual(['in plane stress' in line for line in left], [True])  # the bodies are elastic there
+        self.solve(folder)
+        self.convert('exchanged', deck([a, b], '*TIE, NAME=T\nB_SZ0, A_SZ1\n*BOUNDARY\nA_Z0, 1, 3\nB_X0, 1, 1\n', [('', '*STATIC\n*DSLOAD\nB_SZ1, P, 3.\n')]))
+        self.solve(self.path('exchanged'))  # a tied node with a support of its own would be refused
         for slope, soft in (('5.e7', False), ('5.e4', True)):
             left, folder = self.convert('tied' + slope, deck([a, b], pair('B_SZ0', 'A_SZ1').replace('LINEAR\n5.e7', 'TIED\n' + slope) + SYMMETRY, [('', '*STATIC\n')]))
             with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
