@@ -37,6 +37,15 @@ PetscBool HycoBLASChooseKernels(void);
    Not collective. */
 int HycoBLASSetThreads(int n);
 
+/*
+  For a language that handles Ctrl-C itself. Between the two, SIGINT only makes the library call `ask` between two solves (of points, of
+  samples, steps of a path): 0: it goes on; else the call fails there, as all that follow until HycoInterruptEnd(). That returns whether a
+  signal came of which `ask` was not told, and gives the signal back to its former handler. Pairs may be nested: the outermost counts. Of one
+  process and one thread.
+*/
+void HycoInterruptBegin(int (*ask)(void));
+PetscBool HycoInterruptEnd(void);
+
 #if defined(__cplusplus)
 }
 #endif

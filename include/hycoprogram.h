@@ -7,6 +7,7 @@
 
 #include <hycocompat.h>
 #include <hycosys.h>
+#include <errno.h>
 
 #if defined(__cplusplus)
 extern "C" {
@@ -18,11 +19,15 @@ extern "C" {
 /* Error code: these solutions give no useful model with these settings. A search then tries other settings, and an
    estimate is left out; any other error (disk, memory, a damaged file) ends a run. */
 #define HYCO_ERR_NO_MODEL ((PetscErrorCode)(PETSC_ERR_MAX_VALUE + 1))
+/* Kinds of a user's errors: HycoKeptErrorKind(). */
+#define HYCO_ERR_VALUE       ((PetscErrorCode)(PETSC_ERR_MAX_VALUE + 2))
+#define HYCO_ERR_NO_FILE     ((PetscErrorCode)(PETSC_ERR_MAX_VALUE + 3))
+#define HYCO_ERR_INTERRUPTED ((PetscErrorCode)(PETSC_ERR_MAX_VALUE + 4))
 
 /* -- errors -- */
 
 /* Fails on every rank with the message of the lowest rank whose `message` is not empty, and with the error `caught`
-   there if that is HYCO_ERR_NO_MODEL, else PETSC_ERR_USER. Collective. */
+   there if that is one of hyco's own, else PETSC_ERR_USER. Collective. */
 PetscErrorCode HycoErrorSync(MPI_Comm comm, PetscErrorCode caught, const char message[]);
 
 /* Begin and end catching PETSc errors on this rank as text: between the two, errors print nothing. */
@@ -65,15 +70,26 @@ PetscErrorCode HycoListAdd(char list[HYCO_LINE], const char between[], const cha
 
 /* Raises a user's error on this rank: one line, with numbers as C's printf writes them (PETSc would write 2 as
    "2."). */
-#define HycoFail(...)                                                                                                  \
+#define HycoFail(...) HycoFailAs(PETSC_ERR_USER, __VA_ARGS__)
+#define HycoFailAs(code, ...)                                                                                          \
   do {                                                                                                                 \
     char line_[HYCO_LINE];                                                                                             \
+    const PetscErrorCode code_ = (code);                                                                               \
     HycoFormat(line_, __VA_ARGS__);                                                                                    \
-    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s", line_);                                                             \
+    SETERRQ(PETSC_COMM_SELF, code_, "%s", line_);                                                                      \
   } while (0)
 #define HycoCheck(condition, ...)                                                                                      \
   do {                                                                                                                 \
     if (PetscUnlikely(!(condition))) HycoFail(__VA_ARGS__);                                                            \
+  } while (0)
+/* Of a value that a caller gives; of a file that was not opened, right after the attempt. */
+#define HycoCheckValue(condition, ...)                                                                                 \
+  do {                                                                                                                 \
+    if (PetscUnlikely(!(condition))) HycoFailAs(HYCO_ERR_VALUE, __VA_ARGS__);                                          \
+  } while (0)
+#define HycoCheckFile(condition, ...)                                                                                  \
+  do {                                                                                                                 \
+    if (PetscUnlikely(!(condition))) HycoFailAs(errno == ENOENT ? HYCO_ERR_NO_FILE : PETSC_ERR_USER, __VA_ARGS__);     \
   } while (0)
 
 /* -- communication and memory -- */

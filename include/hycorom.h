@@ -133,14 +133,14 @@ PetscErrorCode HycoROMGetSizes(HycoROM model, PetscInt *n_contacts, PetscInt *n_
   round-off), in the caller's order; points that share a stiffness share its factor. The caller's arrays, each of which
   may be NULL: prediction (n), Lambda (n x n_contacts), U (n x n_nodes x dim, as in HycoROMGetRID()). A solve that does
   not converge is not an error: see HycoPrediction.reason. Afterwards there is no last prediction. Not collective. Fails
-  before any solve if a point lies outside the ranges.
+  before any solve if a point lies outside the ranges; the message has its number, from 0.
 */
 PetscErrorCode HycoROMSolveMany(HycoROM model, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
                                 HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[]);
 /*
-  HycoROMSolveMany() divided over the ranks of comm: each rank has loaded the model, has the same n and mu, and solves a
-  share of consecutive points; every rank receives the results of all points. An error on a rank is one on all of them. The arrays are
-  given by all ranks or by none. Collective on comm.
+  HycoROMSolveMany() divided over the ranks of comm. Each rank has loaded the model. If all give the same n, mu, arrays and
+  model, each solves a share of consecutive points and receives the results of all, and an error on a rank is one on all of
+  them. Otherwise each rank solves its own points, and receives their results and errors alone. Collective on comm.
 */
 PetscErrorCode HycoROMSolveShared(MPI_Comm comm, HycoROM model, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
                                   HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[]);

@@ -57,6 +57,8 @@ PetscErrorCode HycoFinalize(void);
 PetscErrorCode HycoKeepErrors(PetscBool keep);
 /* The line of the last error that was kept on this rank; "": none. Not collective. Borrowed until the next error. */
 const char *HycoKeptError(void);
+/* 'v': a value that the caller gave was wrong; 'f': a file does not exist; 0: another error. Not collective. */
+char HycoKeptErrorKind(void);
 
 /* The version as "major.minor.patch". Not collective. Borrowed. */
 const char *HycoVersion(void);

@@ -20,16 +20,14 @@ PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[]);
   } while (0)
 
 /* HycoFail() and HycoCheck() with HYCO_ERR_NO_MODEL. */
-#define HycoFailNoModel(...)                                                                                           \
-  do {                                                                                                                 \
-    char line_[HYCO_LINE];                                                                                             \
-    HycoFormat(line_, __VA_ARGS__);                                                                                    \
-    SETERRQ(PETSC_COMM_SELF, HYCO_ERR_NO_MODEL, "%s", line_);                                                          \
-  } while (0)
+#define HycoFailNoModel(...) HycoFailAs(HYCO_ERR_NO_MODEL, __VA_ARGS__)
 #define HycoCheckModel(condition, ...)                                                                                 \
   do {                                                                                                                 \
     if (PetscUnlikely(!(condition))) HycoFailNoModel(__VA_ARGS__);                                                     \
   } while (0)
+
+/* Fails if SIGINT came since HycoInterruptBegin() and its owner wants to end: where work can end without loss, between solves. Not collective. */
+PetscErrorCode HycoInterruptCheck(void);
 
 /* Fails for NULL and for an object of another class. Not collective. `classid` is one of HYCO_..._CLASSID. */
 PetscErrorCode HycoHandleCheck(const void *handle, const PetscClassId *classid, const char function[]);

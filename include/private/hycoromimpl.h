@@ -224,6 +224,8 @@ void HycoTraceSummary(HycoROM model, HycoPrediction *prediction);
 void HycoTraceWholeU(HycoROM model, PetscInt k, PetscReal U[]);
 /* Builds the online data from the description; called again after the full-order set has changed. */
 PetscErrorCode HycoROMSetUp(HycoROM model);
+/* Checks n points as HycoROMPredict() does one; the error has the number of the point. */
+PetscErrorCode HycoROMCheckPoints(HycoROM model, PetscInt n, PetscInt n_parameters, const PetscReal mu[]);
 /* Frees the online data. */
 PetscErrorCode HycoROMReset(HycoROM model);
 /* The names of the registered types, in alphabetical order; NULL ends. Borrowed, until another is registered. */

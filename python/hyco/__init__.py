@@ -10,16 +10,20 @@
         print(p.outputs, p.estimates)
 
 Arrays in, arrays out; only NumPy is needed. Under mpiexec every process runs the same program: scenes are solved and trained by all
-together, and many points are divided over them. Errors are hyco.Error with hyco's one line.
+together, and many points are divided over them. Errors are hyco.Error with hyco's one line; some are also ValueError or FileNotFoundError.
 """
 import ctypes
+import os
+import tempfile
+import threading
 import warnings
+import weakref
 from functools import cached_property
 
 import numpy as np
 
 from . import _library as c
-from ._library import Error, NotConverged, World
+from ._library import Error, NotConverged, WrongValue, World
 
 __all__ = ['Scene', 'Model', 'Solution', 'Prediction', 'Gradient', 'Fit', 'Error', 'NotConverged', 'version', 'rank', 'size']
 
@@ -61,15 +65,15 @@ def _points(mu, parameters):
     if hasattr(mu, 'keys'):
         lacking = [name for name in parameters if name not in mu.keys()]
         if lacking:
-            raise Error(f'the values have no {", ".join(lacking)}; the parameters are {", ".join(parameters)}')
+            raise WrongValue(f'the values have no {", ".join(lacking)}; the parameters are {", ".join(parameters)}')
         unknown = [] if hasattr(mu, 'columns') else [str(name) for name in mu.keys() if name not in parameters]  # a table may have other columns
         if unknown:
-            raise Error(f'the values name {", ".join(unknown)}; the parameters are {", ".join(parameters)}')
+            raise WrongValue(f'the values name {", ".join(unknown)}; the parameters are {", ".join(parameters)}')
         values = np.broadcast_arrays(*(np.asarray(mu[name], float) for name in parameters))
         return np.ascontiguousarray(np.stack(values, -1)) if parameters else np.zeros(0)
     mu = np.ascontiguousarray(mu, float)
     if mu.ndim == 0 or mu.shape[-1] != len(parameters):
-        raise Error(f'parameter values of shape {mu.shape} were given; the last dimension must be {len(parameters)}, for '
+        raise WrongValue(f'parameter values of shape {mu.shape} were given; the last dimension must be {len(parameters)}, for '
                     f'{", ".join(parameters) or "no parameters"}')
     return mu
 
@@ -77,7 +81,7 @@ def _points(mu, parameters):
 def _one(mu, parameters):
     mu = _points(mu, parameters)
     if mu.ndim != 1:
-        raise Error(f'parameter values of shape {mu.shape} were given; one point is expected here: {", ".join(parameters)}')
+        raise WrongValue(f'parameter values of shape {mu.shape} were given; one point is expected here: {", ".join(parameters)}')
     return mu
 
 
@@ -128,6 +132,9 @@ class Gradient:
     def __getitem__(self, name):
         return self.value[..., list(self.outputs).index(name), :]
 
+    def __repr__(self):
+        return _shown(self, f'{_several(self.value.shape[:-2])}', **{name: self[name].tolist() if self.value.ndim == 2 else 'array' for name in self.outputs})
+
 
 class Fit:
     """An answer of Model.fit().
@@ -148,6 +155,9 @@ class Fit:
         self.starts, self.at_least, self.evaluations = (int(found[name]) for name in ('n_starts', 'n_least', 'evaluations'))
         self.free, self.determined = int(found['n_free']), int(found['n_determined'])
 
+    def __repr__(self):
+        return _shown(self, _where(self.mu, self.parameters), **self.outputs, misfit=self.misfit, converged=self.converged)
+
 
 def _gradient(function, handle):
     """value, kink, undecided, times, path of the last solution or prediction."""
@@ -161,14 +171,33 @@ def _gradient(function, handle):
             c.copied(at[2], (n_times, *shape)) if n_times else None, c.copied(at[3], shape) if n_times else None)
 
 
+class _Owned:
+    """A handle of the library, which is destroyed with its owner."""
+
+    def __init__(self, destroy, collective):
+        self.handle, self._destroy, self._collective = ctypes.c_void_p(), destroy, collective
+
+    def __del__(self):
+        if c is not None and c.running and not (self._collective and World.size > 1):
+            self.close()
+
+    def close(self):
+        """Frees the object. Closing twice is allowed."""
+        if c.running and self.handle:
+            c.call(self._destroy, ctypes.byref(self.handle))
+        self.handle = ctypes.c_void_p()
+
+
 class _Handle:
-    """An object of the library: closed by close() or at the end of a with block."""
+    """An object of the library: closed by close() or at the end of a with block. `_last` is what solves or predicts, with its last result: each
+    thread has its own."""
     _destroy = ''
     _collective = True  # all processes must close it together
 
     def __init__(self):
         c.begin()
-        self._handle = ctypes.c_void_p()
+        self._own = _Owned(self._destroy, self._collective)
+        self._handle, self._threads, self._solvers, self._latest = self._own.handle, threading.local(), weakref.WeakSet(), None
 
     def __enter__(self):
         return self
@@ -176,21 +205,36 @@ class _Handle:
     def __exit__(self, *_):
         self.close()
 
-    def __del__(self):
-        if c is not None and c.running and getattr(self, '_handle', None) and not (self._collective and World.size > 1):
-            self.close()
-
+    @c.whole
     def close(self):
         """Frees the object. Closing twice is allowed."""
-        if c.running and self._handle:
-            c.call(self._destroy, ctypes.byref(self._handle))
-        self._handle = ctypes.c_void_p()
+        for solver in list(self._solvers):
+            solver.close()
+        self._latest, self._threads = None, threading.local()
+        self._own.close()
+        self._handle = self._own.handle
 
     @property
     def _open(self):
         if not self._handle:
             raise Error(f'this {type(self).__name__} is closed; make a new one')
         return self._handle
+
+    def _solver(self, destroy, create, *arguments):
+        """This thread's object that solves, made at its first solve; until then getters are about the latest of any."""
+        own = getattr(self._threads, 'solver', None)
+        if not own:
+            own = _Owned(destroy, self._collective)
+            c.call(create, *arguments, ctypes.byref(own.handle))
+            self._threads.solver = own
+            self._solvers.add(own)
+        self._latest = own
+        return own.handle
+
+    @property
+    def _last(self):
+        own = getattr(self._threads, 'solver', None) or self._latest
+        return self._open and own and own.handle
 
 
 class Solution:
@@ -208,8 +252,8 @@ class Solution:
     summary           everything else of HycoSummary (hycofom.h): solution.summary['strain_energy']
     """
 
-    def __init__(self, fom, mu, outputs):
-        self.mu = mu.copy()
+    def __init__(self, fom, mu, outputs, parameters=()):
+        self.mu, self._parameters = mu.copy(), tuple(parameters)
         self.summary = np.zeros(1, c.struct('HycoSummary'))
         c.call('HycoFOMGetSummary', fom, c.address(self.summary))
         self.summary = self.summary[0]
@@ -229,6 +273,9 @@ class Solution:
         self.balance = self.balance.value
         self.history = _history('HycoFOMGetHistory', fom, outputs)
 
+    def __repr__(self):
+        return _shown(self, _where(self.mu, self._parameters), **self.outputs, total_contact_force=self.total_contact_force, reason=self.reason)
+
     @property
     def total_contact_force(self):
         """Sum of the contact forces."""
@@ -247,9 +294,10 @@ class Scene(_Handle):
     """
     _destroy = 'HycoSceneDestroy'
 
+    @c.whole
     def __init__(self, path, **entries):
         super().__init__()
-        self._fom = ctypes.c_void_p()
+        self.path = str(path)
         _check_options(entries)
         try:
             for name, value in entries.items():
@@ -266,54 +314,53 @@ class Scene(_Handle):
         c.call('HycoSceneGetHistory', self._handle, ctypes.byref(n), ctypes.byref(times))
         self.times = c.copied(times, n.value)
 
-    def close(self):
-        if c.running and self._fom:
-            c.call('HycoFOMDestroy', ctypes.byref(self._fom))
-        self._fom = ctypes.c_void_p()
-        super().close()
+    def __repr__(self):
+        return _shown(self, repr(self.path), parameters=_ranges(self.parameters), outputs=', '.join(self.outputs))
 
+    @c.whole
     def solve(self, mu=(), check=True):
         """The full-order Solution at mu. check: raise NotConverged if it does not converge."""
         handle, mu = self._open, _one(mu, self.parameters)
-        if not self._fom:
-            c.call('HycoFOMCreate', World.comm, handle, ctypes.byref(self._fom))
-        c.call('HycoFOMSolve', self._fom, c.count(len(mu)), c.address(mu))
-        solution = Solution(self._fom, mu, self.outputs)
+        fom = self._solver('HycoFOMDestroy', 'HycoFOMCreate', World.comm, handle)
+        c.call('HycoFOMSolve', fom, c.count(len(mu)), c.address(mu))
+        solution = Solution(fom, mu, self.outputs, self.parameters)
         if check and not solution.converged:
             why = solution.summary['why'].decode('utf-8', 'replace')
             raise NotConverged(f'full order at {_where(mu, self.parameters)}: {why or solution.reason}', solution)
         return solution
 
+    @c.whole
     def gradient(self, mu=()):
         """The Gradient of the outputs at full order at mu, and what solve(mu) finds. All processes call it together."""
         solution = self.solve(mu)
-        return Gradient(solution.mu, solution.outputs, *_gradient('HycoFOMGetGradient', self._fom))
+        return Gradient(solution.mu, solution.outputs, *_gradient('HycoFOMGetGradient', self._last))
 
+    @c.whole
     def write(self, path):
-        """Writes the last solution to PATH.xdmf with PATH.h5, or PATH.vtkhdf."""
-        if not self._fom:
+        """Writes this thread's last solution to PATH.xdmf with PATH.h5, or PATH.vtkhdf."""
+        if not self._last:
             raise Error('there is no solution to write; solve first')
-        c.call('HycoFOMWrite', self._fom, str(path).encode())
+        c.call('HycoFOMWrite', self._last, str(path).encode())
 
+    @c.whole
     def train(self, path, grid=None, points=None, scatter=None, validation=None, progress=None):
         """Trains a model, writes it to `path` and returns it. Training points: `grid` of so many values per parameter, ends included;
         `points` (n, parameters); or `scatter` points over the ranges. validation: held-out points
-        (n, parameters). progress(done, n): called as points are solved. Settings are those of hyco train, as entries of the Scene:
+        (n, parameters). progress(done, n): called as points are solved. Ctrl-C ends it between two solves; solutions are kept. Settings are those of hyco train, as entries of the Scene:
         hyco_model_type, hyco_pod_tol, ... Solutions are kept in PATH.snapshots."""
         handle, interrupted = self._open, []
-        reducer, samples, held = ctypes.c_void_p(), self._samples(grid, points, scatter), self._samples(None, validation, None)
+        reducer, samples, held = ctypes.c_void_p(), self._samples(grid, points, scatter), self._samples(None, validation, None, 'validation')
         report = np.zeros(1, c.struct('HycoTraining'))
 
-        def told(done, n, _):  # Python handles Ctrl-C only when it runs
+        def told(done, n, _):
             try:
-                if progress:
-                    progress(done, n)
+                progress(done, n)
             except BaseException as error:  # pylint: disable=broad-except
                 interrupted.append(error)
                 return 83  # PETSC_ERR_USER
             return 0
 
-        told = ctypes.CFUNCTYPE(ctypes.c_int, c.integer()[0], c.integer()[0], ctypes.c_void_p)(told)
+        told = ctypes.CFUNCTYPE(ctypes.c_int, c.integer()[0], c.integer()[0], ctypes.c_void_p)(told) if progress else None
         try:
             c.call('HycoReducerCreate', World.comm, handle, ctypes.byref(reducer))
             c.call('HycoReducerSetFromOptions', reducer)
@@ -333,11 +380,11 @@ class Scene(_Handle):
         model.training = report[0]
         return model
 
-    def _samples(self, grid, points, scatter):
+    def _samples(self, grid, points, scatter, name='points'):
         """HycoSamples of one of them; NULL without any."""
         given = [x is not None for x in (grid, points, scatter)]
         if sum(given) > 1:
-            raise Error('several sets of points were given; give one of grid, points, scatter')
+            raise WrongValue('several sets of points were given; give one of grid, points, scatter')
         samples = ctypes.c_void_p()
         if not any(given):
             return samples
@@ -346,12 +393,14 @@ class Scene(_Handle):
             if grid is not None:
                 counts = np.ascontiguousarray(grid, c.integer()[1]).ravel()
                 if len(counts) != len(self.parameters):
-                    raise Error(f'a grid of {len(counts)} numbers was given; {len(self.parameters)} are expected, for {", ".join(self.parameters)}')
+                    raise WrongValue(f'a grid of {len(counts)} numbers was given; {len(self.parameters)} are expected, for {", ".join(self.parameters)}')
                 c.call('HycoSamplesAddTrainingGrid', samples, c.address(counts))
             elif points is not None:
-                for mu in _points(points, self.parameters).reshape(-1, len(self.parameters)):
-                    mu = np.ascontiguousarray(mu)
-                    c.call('HycoSamplesAddPoint', samples, c.address(mu))
+                for k, mu in enumerate(_points(points, self.parameters).reshape(-1, len(self.parameters))):
+                    try:
+                        c.call('HycoSamplesAddPoint', samples, c.address(mu))
+                    except Error as error:
+                        raise type(error)(f'{name}[{k}]: {error}') from None
             else:
                 c.call('HycoSamplesAddScattered', samples, c.count(scatter))
         except Error:
@@ -385,14 +434,52 @@ def _check_options(entries):
     known = sorted(o.name for o in table[:n.value])
     for name in entries:
         if not name.startswith(tuple(f'{section}_' for section in SECTIONS)):
-            raise Error(f'{name} is not an entry of a scene; these begin with {", ".join(f"{section}_" for section in SECTIONS)}')
+            raise WrongValue(f'{name} is not an entry of a scene; these begin with {", ".join(f"{section}_" for section in SECTIONS)}')
         if name.startswith('hyco_') and name.encode() not in known:
             near = c.lib.HycoNearest(name.encode(), c.count(len(known)), (ctypes.c_char_p * len(known))(*known))
-            raise Error(f'there is no option {name}' + (f'; did you mean {near.decode()}?' if near else ' (hyco train -help lists them)'))
+            raise WrongValue(f'there is no option {name}' + (f'; did you mean {near.decode()}?' if near else ' (hyco train -help lists them)'))
 
 
 def _where(mu, parameters):
     return ', '.join(f'{name} {value:g}' for name, value in zip(parameters, mu)) or 'no parameters'
+
+
+def _several(shape):
+    return f'{" x ".join(map(str, shape))} points' if shape else 'one point'
+
+
+def _ranges(parameters):
+    return ', '.join(f'{name} {lo:g} to {hi:g}' for name, (lo, hi) in parameters.items()) or 'none'
+
+
+def _shown(thing, what, **members):
+    """<hyco.Kind what; name: value; ...>"""
+    members = [f'{name}: {value:g}' if isinstance(value, float) else f'{name}: {value}' for name, value in members.items()]
+    return f'<hyco.{type(thing).__name__} {"; ".join([what] + members)}>'
+
+
+def _stamp(path):
+    """Changes with a file."""
+    found = os.stat(path)
+    return found.st_mtime_ns, found.st_size, found.st_ino
+
+
+def _unpickled(path, file, contents):
+    """The Model of these contents: `file`, if it has them, or a copy."""
+    try:
+        with open(file, 'rb') as there:
+            same = there.read() == contents
+    except OSError:
+        same = False
+    if not same:
+        number, file = tempfile.mkstemp('.h5', 'hyco-')
+        with os.fdopen(number, 'wb') as copy:
+            copy.write(contents)
+    model = Model(file)
+    model.path = path
+    if not same:
+        weakref.finalize(model, os.remove, file)
+    return model
 
 
 class Prediction:
@@ -416,6 +503,11 @@ class Prediction:
         self.contact_forces, self.displacement = contact_forces, displacement
         self._outputs, self._parameters = outputs, parameters
         self.converged = data['reason'] > 0 if self.shape else bool(data['reason'] > 0)
+
+    def __repr__(self):
+        if self.shape:
+            return _shown(self, _several(self.shape), outputs=', '.join(self._outputs), converged=f'{np.sum(self.converged)} of {np.size(self.converged)}')
+        return _shown(self, _where(self.mu, self._parameters), **self.outputs, total_contact_force=self.total_contact_force, reason=self.reason)
 
     def _value(self, name, k=None):
         """A member, or item k of one that is an array; a number for one point."""
@@ -469,7 +561,8 @@ class Prediction:
 
 
 class Model(_Handle):
-    """A reduced model from its file; nothing else is needed.
+    """A reduced model from its file; nothing else is needed. It can be pickled, with the file's contents: where the file is not the same, a
+    copy is made until the process ends.
 
     parameters  {name: (lo, hi)} of its training
     outputs     names of the outputs
@@ -477,14 +570,16 @@ class Model(_Handle):
     contacts    names of the contacts
     type        'hybrid', 'bodies', ...
     n_contacts  number of contact forces
+    path        the file
     """
     _destroy = 'HycoROMDestroy'
     _collective = False
     training = None  # of Scene.train(): numbers and texts of HycoTraining (hycoreducer.h)
 
+    @c.whole
     def __init__(self, path):
         super().__init__()
-        self._extrapolate = False
+        self.path, self._file, self._extrapolate = str(path), os.path.abspath(path), False
         c.call('HycoROMLoad', str(path).encode(), ctypes.byref(self._handle))
         scene, kind = ctypes.c_void_p(), ctypes.c_char_p()
         c.call('HycoROMGetScene', self._handle, ctypes.byref(scene))
@@ -500,13 +595,26 @@ class Model(_Handle):
         sizes = [c.count() for _ in range(3)]
         c.call('HycoROMGetSizes', self._handle, *(ctypes.byref(n) for n in sizes))
         self.n_contacts, self._n_nodes, self._dim = (n.value for n in sizes)
+        self._stamp = _stamp(self._file)
 
+    def __repr__(self):
+        return _shown(self, repr(self.path), type=self.type, parameters=_ranges(self.parameters), outputs=', '.join(self.outputs))
+
+    def __reduce__(self):
+        with self._open and open(self._file, 'rb') as file:
+            contents = file.read()
+        if _stamp(self._file) != self._stamp:
+            raise Error(f'{self.path} has changed since the model was loaded; load it again')
+        return _unpickled, (self.path, self._file, contents)
+
+    @c.whole
     def predict(self, mu, contact_forces=False, displacement=False, extrapolate=False, check=True):
         """The Prediction at mu: one point (parameters,) or many (..., parameters); or {parameter: values}, a pandas.DataFrame too.
-        Under mpiexec many points are divided over the processes, which must all call it with the same points; every process gets all
-        answers. contact_forces, displacement: return these arrays too. extrapolate: accept points outside the ranges. check: raise
+        Under mpiexec all processes must call it together for many points: the same points of all are divided over them, and every process gets
+        all answers; other points of each are its own. Ctrl-C ends it between two points. contact_forces, displacement: return these arrays too. extrapolate: accept points outside the ranges. check: raise
         NotConverged if a solve does not converge."""
         handle, mu = self._open, _points(mu, self.parameters)
+        handle = self._solver('HycoROMDestroy', 'HycoROMClone', handle)
         shape, n_par = mu.shape[:-1], mu.shape[-1]
         n = int(np.prod(shape))
         data = np.zeros(shape, c.struct('HycoPrediction'))
@@ -525,10 +633,12 @@ class Model(_Handle):
         if check and not (np.all(result.converged) if shape else result.converged):
             bad = np.flatnonzero(~np.atleast_1d(result.converged).ravel())
             at = mu.reshape(-1, n_par)[bad[0]]
-            raise NotConverged(f'{len(bad)} of {n} predictions, the first at {_where(at, self.parameters)}: '
+            first = f'points[{bad[0]}], ' if n > 1 else ''
+            raise NotConverged(f'{len(bad)} of {n} predictions, the first at {first}{_where(at, self.parameters)}: '
                                f'{c.reason(data.ravel()[bad[0]]["reason"])}', result)
         return result
 
+    @c.whole
     def gradient(self, mu, extrapolate=False):
         """The Gradient of the outputs at mu: one point (parameters,) or many (..., parameters), which this process solves one by one. A
         point of a set without a gradient has nan, and a warning says which; without any the first one's Error is raised."""
@@ -537,9 +647,12 @@ class Model(_Handle):
         size = (len(self.outputs), len(self.parameters))
         outputs, found, lacking, first = np.zeros((len(points), size[0])), {}, {}, None
         for k, point in enumerate(points):
-            outputs[k] = list(self.predict(point, extrapolate=extrapolate, check=bool(not shape)).outputs.values())
             try:
-                found[k] = _gradient('HycoROMGetGradient', self._open)
+                outputs[k] = list(self.predict(point, extrapolate=extrapolate, check=bool(not shape)).outputs.values())
+            except WrongValue as error:
+                raise WrongValue(f'points[{k}]: {error}' if shape else str(error)) from None
+            try:
+                found[k] = _gradient('HycoROMGetGradient', self._last)
             except Error as error:
                 lacking[np.unravel_index(k, shape) if len(shape) > 1 else k] = str(error)
                 first = first or (k, error)
@@ -547,7 +660,7 @@ class Model(_Handle):
             raise first[1]
         if first:
             warnings.warn(f'{len(lacking)} of {len(points)} points have no gradient, the first at {_where(points[first[0]], self.parameters)}: {first[1]}',
-                          stacklevel=2)
+                          stacklevel=3)
 
         def spread(column, empty, of):
             """A result of all points, `empty` at those without; its shape at a point is `of`."""
@@ -558,53 +671,59 @@ class Model(_Handle):
         named = {name: outputs[:, k].reshape(shape)[()] for k, name in enumerate(self.outputs)}
         return Gradient(mu, named, spread(0, np.nan, size), spread(1, False, size), spread(2, 0, ())[()], times, path, lacking)
 
+    @c.whole
     def fit(self, targets, start=None, starts=1, samples=64, kind='brgn', hold=None):
         """The Fit of {output: target}: the parameters within the ranges at which the outputs are closest to the targets, as hyco fit; of
         a path at its last time, and path_OUTPUT over its listed times (the largest, or as the output's entry `path` says).
         It minimises from the `starts` best of `samples` predictions over the ranges, or from `start` alone, by the TAO type `kind`
         (brgn, blmvm); hold: {parameter: value} that are kept. Under mpiexec each process does the same."""
-        handle, known = self._open, self.outputs + ([f'path_{name}' for name in self.outputs] if self._times else [])
+        handle, known = self._solver('HycoROMDestroy', 'HycoROMClone', self._open), self.outputs + ([f'path_{name}' for name in self.outputs] if self._times else [])
         lacking = [name for name in targets if name not in known]
         if lacking or not targets:
-            raise Error(f'the targets name {", ".join(lacking) or "no output"}; the outputs are {", ".join(self.outputs)}')
+            raise WrongValue(f'the targets name {", ".join(lacking) or "no output"}; the outputs are {", ".join(self.outputs)}')
         output = np.array([known.index(name) for name in targets], c.integer()[1])
         target = np.array(list(targets.values()), float)
         mu, found = np.zeros(len(self.parameters)), np.zeros(1, c.struct('HycoFit'))
         start = None if start is None else _one(start, self.parameters)
         lacking = [name for name in hold or {} if name not in self.parameters]
         if lacking:
-            raise Error(f'hold names {", ".join(lacking)}; the parameters are {", ".join(self.parameters)}')
+            raise WrongValue(f'hold names {", ".join(lacking)}; the parameters are {", ".join(self.parameters)}')
         held = np.array([(hold or {}).get(name, np.nan) for name in self.parameters], float)
         c.call('HycoROMFit', handle, c.count(len(output)), c.address(output), c.address(target), c.address(start), c.address(held), c.count(samples),
                c.count(starts), kind.encode(), c.address(mu), c.address(found))
         fit = Fit(mu, self.predict(mu, check=False).outputs, self.parameters, found[0])
         if fit.determined < fit.free:
             warnings.warn(f'{fit.free} parameters are free, and the targets determine {fit.determined} of them or of their combinations: the answer is one of '
-                          'many; hold parameters (hold=) or give more targets', stacklevel=2)
+                          'many; hold parameters (hold=) or give more targets', stacklevel=3)
         return fit
 
-    # ---- of the last prediction at one point
+    # ---- of the last prediction at one point, of this thread
 
+    @c.whole
     def contact_results(self):
         """Of the last single prediction: list of {name, n, n_active, force, moment, area, pressure}, as Solution.contacts."""
-        return _records('HycoROMGetContacts', self._open, 'HycoContactResult')
+        return _records('HycoROMGetContacts', self._last or self._open, 'HycoContactResult')
 
+    @c.whole
     def history(self):
         """Of the last single prediction of a path: its listed times, a structured array; None for other models."""
-        return _history('HycoROMGetHistory', self._open, self.outputs)
+        return _history('HycoROMGetHistory', self._last or self._open, self.outputs)
 
+    @c.whole
     def whole_displacement(self):
         """Of the last single prediction: (nodes, dim) of the whole mesh, in the mesh file's order."""
         n, at = c.count(), ctypes.c_void_p()
-        c.call('HycoROMGetWholeU', self._open, ctypes.byref(n), ctypes.byref(at))
+        c.call('HycoROMGetWholeU', self._last or self._open, ctypes.byref(n), ctypes.byref(at))
         return c.copied(at, (n.value, self._dim))
 
+    @c.whole
     def node_tags(self):
         """Of the last single prediction: the mesh file's tags of the nodes of Prediction.displacement."""
         n, tags = c.count(), ctypes.c_void_p()
-        c.call('HycoROMGetRID', self._open, ctypes.byref(n), ctypes.byref(tags), None, None, None, None)
+        c.call('HycoROMGetRID', self._last or self._open, ctypes.byref(n), ctypes.byref(tags), None, None, None, None)
         return c.copied(tags, n.value, c.integer()[1])
 
+    @c.whole
     def write(self, path):
         """Writes the last single prediction on the whole mesh to PATH.xdmf with PATH.h5, or PATH.vtkhdf."""
-        c.call('HycoROMWrite', self._open, str(path).encode())
+        c.call('HycoROMWrite', self._last or self._open, str(path).encode())

@@ -1,7 +1,9 @@
 """The C library by ctypes: where it is, its start and end, its errors, and its structs as NumPy types."""
 import atexit
 import ctypes
+import functools
 import os
+import signal
 import sys
 import threading
 
@@ -12,12 +14,23 @@ class Error(Exception):
     """A call failed; str() is hyco's one line: what was found, what was expected, what to do."""
 
 
+class WrongValue(Error, ValueError):
+    """An argument, a parameter value or an entry is wrong: an Error that is also a ValueError."""
+
+
+class NoFile(Error, FileNotFoundError):
+    """A file does not exist: an Error that is also a FileNotFoundError."""
+
+
 class NotConverged(Error):
     """A solve did not converge; `result` is what would have been returned (check=False returns it instead)."""
 
     def __init__(self, line, result):
-        super().__init__(line)
+        super().__init__(line, result)
         self.result = result
+
+    def __str__(self):
+        return self.args[0]
 
 
 class Field(ctypes.Structure):
@@ -47,10 +60,12 @@ lib.HycoKeptError.restype = ctypes.c_char_p
 lib.HycoVersion.restype = ctypes.c_char_p
 lib.HycoReasonName.restype = ctypes.c_char_p
 lib.HycoNearest.restype = ctypes.c_char_p
+lib.HycoKeptErrorKind.restype = ctypes.c_char
 # As a process that no launcher started: neither a daemon nor a network is needed. As the command does (hyco/src/app/launch.c).
 ALONE = {'OMPI_MCA_ess_singleton_isolated': '1', 'OMPI_MCA_orte_create_session_dirs': '0', 'OMPI_MCA_btl': 'self', 'OMPI_MCA_pml': 'ob1',
          'OMPI_MCA_if': '^posix_ipv4', 'PMIX_MCA_pif': '^posix_ipv4', 'HWLOC_HIDE_ERRORS': '2'}
 LAUNCHED = ('OMPI_COMM_WORLD_SIZE', 'PMIX_RANK', 'PMI_RANK', 'PMI_FD', 'PMI_ID')
+READERS = ('HycoSceneLoad', 'HycoROMLoad')  # of files that the user gives
 running = False
 lock = threading.RLock()
 
@@ -104,17 +119,54 @@ def leave(kind, value, trace, report=sys.excepthook):
     lib.MPI_Abort(World.comm, 1)
 
 
+def whole(method):
+    """A method that no other thread interrupts: its calls, and what they leave behind, belong together."""
+    @functools.wraps(method)
+    def alone(*arguments, **named):
+        with lock:
+            return method(*arguments, **named)
+    return alone
+
+
+raised = []  # by the program's handler of Ctrl-C during a call
+
+
+@ctypes.CFUNCTYPE(ctypes.c_int)
+def ask():
+    """Between two solves, after Ctrl-C: what the program's own handler does; an exception ends the call."""
+    try:
+        signal.getsignal(signal.SIGINT)(signal.SIGINT, sys._getframe())  # pylint: disable=protected-access
+    except BaseException as error:  # pylint: disable=broad-except
+        raised.append(error)
+    return len(raised)
+
+
+def interruptible():
+    """Whether Ctrl-C is Python's: in its main thread, with a handler. Of several processes the launcher ends all."""
+    return World.size == 1 and threading.current_thread() is threading.main_thread() and callable(signal.getsignal(signal.SIGINT))
+
+
 def call(name, *arguments):
-    """Calls a function of the library; its error becomes an exception."""
+    """Calls a function of the library; its error becomes an exception, and so does Ctrl-C meanwhile."""
     with lock:  # PETSc knows nothing of threads; a callback may call again
+        noted = interruptible()
+        if noted:
+            lib.HycoInterruptBegin(ask)
         lib.HycoKeepErrors(1)
         threads = lib.HycoBLASSetThreads(1)  # of the program's BLAS, which NumPy may share
-        failed = getattr(lib, name)(*arguments)
-        lib.HycoBLASSetThreads(threads)
-        line = bytes(lib.HycoKeptError()) if failed else b''
-        lib.HycoKeepErrors(0)
+        try:
+            failed = getattr(lib, name)(*arguments)
+            line, kind = (bytes(lib.HycoKeptError()), lib.HycoKeptErrorKind()) if failed else (b'', b'')
+        finally:
+            lib.HycoBLASSetThreads(threads)
+            lib.HycoKeepErrors(0)
+            if noted and lib.HycoInterruptEnd():
+                ask()
+    if raised:
+        raise raised.pop()
     if failed:
-        raise Error(line.decode('utf-8', 'replace') or f'{name} failed with PETSc error {failed}')
+        kind = NoFile if kind == b'f' else WrongValue if kind == b'v' or name in READERS else Error
+        raise kind(line.decode('utf-8', 'replace') or f'{name} failed with PETSc error {failed}')
 
 
 def layout(name):

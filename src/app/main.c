@@ -48,7 +48,7 @@ static PetscErrorCode KeepMessage(MPI_Comm comm, int line, const char *function,
   if (HycoWantsTrace()) (void)!PetscTraceBackErrorHandler(comm, line, function, file, code, type, text, ctx);
   if (type == PETSC_ERROR_INITIAL) {
     /* Errors that a user can mend have a text written for them; all others are defects, shown with their place. */
-    if (code == PETSC_ERR_USER || code == PETSC_ERR_ORDER || code == HYCO_ERR_NO_MODEL)
+    if (code == PETSC_ERR_USER || code == PETSC_ERR_ORDER || code > PETSC_ERR_MAX_VALUE)
       snprintf(message, sizeof(message), "%s", text ? text : "");
     else
       snprintf(message, sizeof(message), "internal error %d in %s (%s:%d): %s", (int)code, function ? function : "?",

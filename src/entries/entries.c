@@ -158,11 +158,11 @@ static PetscErrorCode FindFile(const char path[], char file[PETSC_MAX_PATH_LEN],
 
   PetscFunctionBegin;
   HycoCheck(strlen(path) + 16 < PETSC_MAX_PATH_LEN, "the scene's path is too long");
-  HycoCheck(stat(path, &info) == 0, "the scene %s does not exist; give a folder with scene.yaml, or a .yaml file",
-            path);
+  HycoCheckFile(stat(path, &info) == 0, "the scene %s does not exist; give a folder with scene.yaml, or a .yaml file",
+                path);
   if (S_ISDIR(info.st_mode)) {
     snprintf(file, PETSC_MAX_PATH_LEN, "%s%sscene.yaml", path, path[strlen(path) - 1] == '/' ? "" : "/");
-    HycoCheck(stat(file, &info) == 0, "the folder %s has no scene.yaml", path);
+    HycoCheckFile(stat(file, &info) == 0, "the folder %s has no scene.yaml", path);
   } else {
     snprintf(file, PETSC_MAX_PATH_LEN, "%s", path);
   }

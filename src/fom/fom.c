@@ -565,6 +565,7 @@ PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   t = &f->summary.seconds;
+  PetscCall(HycoInterruptCheck());
   PetscCall(CheckPoint(f, n, mu));
   if (f->path) {
     PetscCall(HycoPathSolve(f, mu));

@@ -267,6 +267,7 @@ static PetscErrorCode Reach(HycoPath p, PetscReal end, PetscBool *reached)
 
     /* Prescribed times replace the request. */
     if (p->substeps > 1 && !p->given) p->dt = PetscMin(p->dt, (end - s->times[p->step - 1]) / (PetscReal)p->substeps);
+    PetscCall(HycoInterruptCheck());
     PetscCall(TryStep(p, stop));
     /* Where a body slides away in a larger step, its time is known well enough: steps just before it are the dearest. */
     if (p->slides[0]) least = PetscMax(least, SLIDES * (s->times[s->n_times - 1] - s->times[0]));

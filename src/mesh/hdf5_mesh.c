@@ -84,7 +84,7 @@ static PetscErrorCode FindTopology(const char path[], size_t room, char name[])
   ssize_t length = -1;
 
   PetscFunctionBegin;
-  HycoCheck(file, "the mesh %s cannot be opened", path);
+  HycoCheckFile(file, "the mesh %s cannot be opened", path);
   fclose(file);
   /* HDF5 would print its stack of errors for a file of another kind; the failure is reported by one line below. */
   H5E_BEGIN_TRY

@@ -763,7 +763,7 @@ static PetscErrorCode ReadAll(Msh *m)
   size_t got;
 
   PetscFunctionBegin;
-  HycoCheck(file,
+  HycoCheckFile(file,
             "the mesh %s cannot be opened; scripts/meshes makes the meshes of the examples, and gmsh -2 or -3 makes "
             "one from a .geo file",
             m->path);

@@ -210,6 +210,7 @@ PetscErrorCode HycoReducerTell(HycoReducer t, const char what[], PetscInt done, 
   char phase[2 * HYCO_LINE];
 
   PetscFunctionBegin;
+  PetscCall(HycoInterruptCheck());
   if (!t->phase || t->rank) PetscFunctionReturn(PETSC_SUCCESS);
   snprintf(phase, sizeof(phase), "%s%s%s", t->doing, t->doing[0] ? ": " : "", what);
   PetscCall((*t->phase)(phase, done, n, t->phase_ctx));

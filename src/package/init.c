@@ -13,7 +13,7 @@ static void Compose(char said[HYCO_LINE], int line, const char function[], const
                     const char message[])
 {
   /* Codes of messages that are written for the user; others need PETSc's location. */
-  const PetscBool own = (PetscBool)(code == PETSC_ERR_USER || code == PETSC_ERR_ORDER || code == HYCO_ERR_NO_MODEL ||
+  const PetscBool own = (PetscBool)(code == PETSC_ERR_USER || code == PETSC_ERR_ORDER || code > PETSC_ERR_MAX_VALUE ||
                                     code == PETSC_ERR_ARG_NULL || code == PETSC_ERR_ARG_WRONG);
   char text[HYCO_LINE];
 
@@ -40,26 +40,34 @@ static void Tell(MPI_Comm comm, int line, const char function[], const char file
 
 /* One text for the process, as PETSc's stack of error handlers is. */
 static char kept[HYCO_LINE];
+static char kept_kind;
 
 /* Only the first error of a chain has the message: the others are the callers' lines of the trace. */
 static PetscErrorCode Keep(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
                            PetscErrorType type, const char *text, void *ctx)
 {
   (void)comm, (void)ctx;
-  if (type == PETSC_ERROR_INITIAL) Compose(kept, line, function, file, code, text);
+  if (type != PETSC_ERROR_INITIAL) return code;
+  Compose(kept, line, function, file, code, text);
+  kept_kind = code == HYCO_ERR_VALUE ? 'v' : code == HYCO_ERR_NO_FILE ? 'f' : 0;
   return code;
 }
 
 /* For bindings, which raise the text as an exception of their language. Calls with true and false must be paired. */
 PetscErrorCode HycoKeepErrors(PetscBool keep)
 {
-  kept[0] = '\0';
+  kept[0] = kept_kind = '\0';
   return keep ? PetscPushErrorHandler(Keep, NULL) : PetscPopErrorHandler();
 }
 
 const char *HycoKeptError(void)
 {
   return kept;
+}
+
+char HycoKeptErrorKind(void)
+{
+  return kept_kind;
 }
 
 /* Replaces PETSc's error handler, which prints a call trace. In main() PETSc aborts by MPI; a process that runs

@@ -79,18 +79,19 @@ PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const Petsc
     char list[HYCO_LINE] = "";
 
     for (PetscInt p = 0; p < scene->n_parameters; p++) PetscCall(HycoListAdd(list, ", ", scene->parameter[p]));
-    HycoFail("%d parameter values were given; the scene has %d: %s", (int)n, (int)scene->n_parameters,
-             list[0] ? list : "none");
+    HycoFailAs(HYCO_ERR_VALUE, "%d parameter values were given; the scene has %d: %s", (int)n, (int)scene->n_parameters,
+               list[0] ? list : "none");
   }
   for (PetscInt p = 0; p < n; p++) {
     /* A grid's last value may exceed its range by round-off. */
     const PetscReal slack = 1e-12 * PetscMax(PetscAbsReal(scene->lo[p]), PetscAbsReal(scene->hi[p]));
 
-    HycoCheck(!PetscIsInfOrNanReal(mu[p]), "%s is not a finite number", scene->parameter[p]);
-    HycoCheck(scene->extrapolate || (mu[p] >= scene->lo[p] - slack && mu[p] <= scene->hi[p] + slack),
-              "%s = %.10g lies outside its range [%.10g, %.10g]; widen the range of a scene by -parameter_%s_range "
-              "LO,HI, or permit it in a model by -extrapolate",
-              scene->parameter[p], (double)mu[p], (double)scene->lo[p], (double)scene->hi[p], scene->parameter[p]);
+    HycoCheckValue(!PetscIsInfOrNanReal(mu[p]), "%s is not a finite number", scene->parameter[p]);
+    HycoCheckValue(
+        scene->extrapolate || (mu[p] >= scene->lo[p] - slack && mu[p] <= scene->hi[p] + slack),
+        "%s = %.10g lies outside its range [%.10g, %.10g]; widen the range of a scene by -parameter_%s_range "
+        "LO,HI, or permit it in a model by -extrapolate",
+        scene->parameter[p], (double)mu[p], (double)scene->lo[p], (double)scene->hi[p], scene->parameter[p]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -147,7 +148,7 @@ static PetscErrorCode HashFile(HycoScene scene, unsigned long long *hash)
 
   PetscFunctionBegin;
   HycoCheck(scene->mesh_path[0], "the scene has no mesh; write scene: mesh: FILE.msh, or give -scene_mesh FILE.msh");
-  HycoCheck(file, "the mesh %s cannot be opened", scene->mesh_path);
+  HycoCheckFile(file, "the mesh %s cannot be opened", scene->mesh_path);
   while ((n = fread(buffer, 1, sizeof(buffer), file)) > 0) *hash = HycoHash(*hash, buffer, n);
   fclose(file);
   PetscFunctionReturn(PETSC_SUCCESS);

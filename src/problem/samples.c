@@ -69,10 +69,10 @@ PetscErrorCode HycoSamplesAddProduct(HycoSamples s, const PetscInt counts[], con
   HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
   HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
-    HycoCheck(counts[p] >= 1, "parameter %s has %d values; at least 1 is needed", s->scene->parameter[p],
-              (int)counts[p]);
+    HycoCheckValue(counts[p] >= 1, "parameter %s has %d values; at least 1 is needed", s->scene->parameter[p],
+                   (int)counts[p]);
     /* By a quotient: the product itself could exceed 32 bits. */
-    HycoCheck(total <= 100000000 / counts[p], "the set has more than 100 million points; use fewer per parameter");
+    HycoCheckValue(total <= 100000000 / counts[p], "the set has more than 100 million points; use fewer per parameter");
     total *= counts[p];
   }
   for (PetscInt k = 0; k < total; k++) {
@@ -111,8 +111,9 @@ static PetscErrorCode AddGrid(HycoSamples s, const PetscInt counts[], PetscBool 
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
     const PetscInt needed = s->scene->lo[p] < s->scene->hi[p] ? least : 1;
 
-    HycoCheck(counts[p] >= needed && counts[p] <= 100000000, "the grid has %d points for %s; at least %d are needed",
-              (int)counts[p], s->scene->parameter[p], (int)needed);
+    HycoCheckValue(counts[p] >= needed && counts[p] <= 100000000,
+                   "the grid has %d points for %s; at least %d are needed", (int)counts[p], s->scene->parameter[p],
+                   (int)needed);
   }
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
     const PetscReal lo = s->scene->lo[p], hi = s->scene->hi[p];
@@ -157,8 +158,8 @@ PetscErrorCode HycoSamplesAddChebyshev(HycoSamples s, const PetscInt counts[])
   HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
     /* All counts before the first allocation: a failed check would leak the nodes of the former parameters. */
-    HycoCheck(counts[p] >= 1 && counts[p] <= 100000000, "the grid has %d points for %s; at least 1 is needed",
-              (int)counts[p], s->scene->parameter[p]);
+    HycoCheckValue(counts[p] >= 1 && counts[p] <= 100000000, "the grid has %d points for %s; at least 1 is needed",
+                   (int)counts[p], s->scene->parameter[p]);
   }
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
     PetscCall(PetscMalloc1(counts[p], &values[p]));
@@ -237,7 +238,7 @@ static PetscErrorCode ReadFile(HycoSamples s, const char path[])
   FILE *file = fopen(path, "r");
 
   PetscFunctionBegin;
-  HycoCheck(file, "the file of points %s cannot be opened", path);
+  HycoCheckFile(file, "the file of points %s cannot be opened", path);
   HycoFinally(ReadLines(s, path, file), fclose(file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

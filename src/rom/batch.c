@@ -2,6 +2,7 @@
    stiffness is assembled and factored once. */
 #include <hycoromimpl.h>
 #include <stdlib.h>
+#include <string.h>
 
 typedef struct {
   const PetscReal *mu;
@@ -80,6 +81,30 @@ static PetscErrorCode SolveEach(HycoROM m, PetscInt n, const Point point[], Hyco
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* *at: the point that is checked. */
+static PetscErrorCode CheckEach(HycoROM m, PetscInt n, PetscInt n_parameters, const PetscReal mu[], PetscInt *at)
+{
+  PetscFunctionBegin;
+  HycoCheckValue(n >= 0 && (mu || !n), "%d points were given%s", (int)n, mu ? "" : " at NULL");
+  for (*at = 0; *at < n; ++*at)
+    PetscCall(HycoSceneCheckParameters(m->model->scene, n_parameters, mu + *at * n_parameters));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The first wrong point by its number; the only one needs none. */
+PetscErrorCode HycoROMCheckPoints(HycoROM m, PetscInt n, PetscInt n_parameters, const PetscReal mu[])
+{
+  char why[HYCO_LINE];
+  PetscErrorCode caught;
+  PetscInt at = 0;
+
+  PetscFunctionBegin;
+  HycoCatch(CheckEach(m, n, n_parameters, mu, &at), caught, why);
+  if (caught && n > 1) HycoFailAs(caught, "points[%d]: %s", (int)at, why);
+  if (caught) HycoFailAs(caught, "%s", why);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* All points are checked before the first is solved: a wrong one must not cost the time of those before it. Results are
    written to the caller's places, whatever the order of the solves. */
 PetscErrorCode HycoROMSolveMany(HycoROM m, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
@@ -91,8 +116,7 @@ PetscErrorCode HycoROMSolveMany(HycoROM m, PetscInt n, PetscInt n_parameters, co
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  for (PetscInt k = 0; k < n; k++)
-    PetscCall(HycoSceneCheckParameters(m->model->scene, n_parameters, mu + k * n_parameters));
+  PetscCall(HycoROMCheckPoints(m, n, n_parameters, mu));
   PetscCall(HycoROMSetUp(m));
   PetscCall(PetscMalloc1(n, &point));
   ierr = Sort(m, n, mu, order, point);
@@ -121,17 +145,44 @@ static PetscErrorCode Share(MPI_Comm comm, size_t bytes, const PetscMPIInt count
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether all ranks give the same points to the same model, and take the same results. Collective. */
+static PetscErrorCode AgreeOnBatch(MPI_Comm comm, HycoROM m, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
+                                   PetscInt wanted, PetscBool *agree)
+{
+  const PetscInt sizes[] = {
+      n, n_parameters, m->model->pairs.n, m->model->mesh->n_nodes, m->model->scene->extrapolate, wanted, m->model->l};
+  const size_t bytes = mu && n > 0 && n_parameters > 0 ? (size_t)n * (size_t)n_parameters * sizeof(*mu) : 0;
+  PetscInt64 ends[2];
+
+  PetscFunctionBegin;
+  ends[0] = (PetscInt64)HycoHash(HycoHash(HYCO_HASH_START, sizes, sizeof(sizes)), m->model->fingerprint,
+                                 strlen(m->model->fingerprint));
+  ends[0] = (PetscInt64)HycoHash((unsigned long long)ends[0], mu, bytes);
+  ends[1] = ~ends[0]; /* the largest complement is that of the smallest */
+  HycoAllreduce(ends, 2, MPIU_INT64, MPI_MAX, comm);
+  *agree = (PetscBool)(ends[0] == ~ends[1]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Contiguous shares, n r / size in 64 bits. Every rank has the model and gets all results; an error of one rank is
-   raised on all. */
+   raised on all. Ranks with points of their own solve them alone. */
 PetscErrorCode HycoROMSolveShared(MPI_Comm comm, HycoROM m, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
                                   HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[])
 {
   PetscMPIInt size, *count, *first;
   PetscInt n_contacts, n_nodes, dim;
   size_t n_dof, at;
+  PetscBool agree = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(HycoROMGetSizes(m, &n_contacts, &n_nodes, &dim));
+  PetscCall(AgreeOnBatch(comm, m, n, n_parameters, mu, !!prediction + 2 * !!Lambda + 4 * !!U, &agree));
+  if (!agree) {
+    PetscCall(HycoROMSolveMany(m, n, n_parameters, mu, prediction, Lambda, U));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  /* All of them first: their numbers are those of the caller. */
+  PetscCall(HycoROMCheckPoints(m, n, n_parameters, mu));
   PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCall(PetscMalloc2(size, &count, size, &first));
   for (PetscMPIInt r = 0; r < size; r++) {

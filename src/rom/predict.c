@@ -86,6 +86,7 @@ PetscErrorCode HycoROMPredict(HycoROM m, PetscInt n, const PetscReal mu[])
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   p = &m->prediction;
+  PetscCall(HycoInterruptCheck());
   PetscCall(HycoSceneCheckParameters(m->model->scene, n, mu));
   /* Before the set-up, so that after an error no getter returns the results of the prediction before. */
   m->solved = m->measured = m->whole_current = m->balanced = PETSC_FALSE;

@@ -288,8 +288,7 @@ PetscErrorCode HycoROMWriteMany(HycoROM m, PetscInt n, PetscInt n_parameters, co
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   HycoCheck(!m->model->scene->n_times, "HycoROMWriteMany: the scene has a history; HycoROMWrite() writes a path");
-  for (PetscInt k = 0; k < n; k++)
-    PetscCall(HycoSceneCheckParameters(m->model->scene, n_parameters, mu + k * n_parameters));
+  PetscCall(HycoROMCheckPoints(m, n, n_parameters, mu));
   PetscCall(HycoFieldFileCreate(PETSC_COMM_SELF, path, n, PETSC_TRUE, &file));
   for (PetscInt k = 0; k < n && !ierr; k++) ierr = WritePoint(m, mu + k * n_parameters, file);
   /* Destroyed without it, the file is removed: it is complete or absent. */

@@ -113,7 +113,7 @@ PetscErrorCode HycoErrorSync(MPI_Comm comm, PetscErrorCode caught, const char me
   PetscMPIInt size, mine, first;
   /* Broadcast as bytes: the ranks run the same program. */
   struct {
-    PetscBool no_model;
+    PetscErrorCode code;
     char line[HYCO_LINE];
   } said;
 
@@ -124,11 +124,11 @@ PetscErrorCode HycoErrorSync(MPI_Comm comm, PetscErrorCode caught, const char me
   if (size > 1) PetscCallMPI(MPI_Allreduce(&mine, &first, 1, MPI_INT, MPI_MIN, comm));
   if (first == size) PetscFunctionReturn(PETSC_SUCCESS);
   if (HycoRank(comm) == first) {
-    said.no_model = (PetscBool)(caught == HYCO_ERR_NO_MODEL);
+    said.code = caught > PETSC_ERR_MAX_VALUE ? caught : PETSC_ERR_USER;
     snprintf(said.line, sizeof(said.line), "%s", message);
   }
   if (size > 1) PetscCallMPI(MPI_Bcast(&said, sizeof(said), MPI_BYTE, first, comm));
-  SETERRQ(comm, said.no_model ? HYCO_ERR_NO_MODEL : PETSC_ERR_USER, "%s", said.line);
+  SETERRQ(comm, said.code, "%s", said.line);
 }
 
 /* FNV-1a; also used to continue a hash. */

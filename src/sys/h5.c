@@ -314,8 +314,9 @@ PetscErrorCode HycoH5OpenOr(const char path[], const char remedy[], HycoH5 *file
 
   PetscFunctionBegin;
   HycoCatch(HycoH5Open(path, file), caught, message);
-  HycoCheck(!message[0], "%s%s%s", message, strstr(message, "damaged") ? "; " : "",
-            strstr(message, "damaged") ? remedy : "");
+  if (message[0])
+    HycoFailAs(caught > PETSC_ERR_MAX_VALUE ? caught : PETSC_ERR_USER, "%s%s%s", message,
+               strstr(message, "damaged") ? "; " : "", strstr(message, "damaged") ? remedy : "");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -272,7 +272,8 @@ static PetscErrorCode Find(HycoOptionItems items, const char name[], const char 
   /* A caller's prefix is set on the command line, not in the scene. */
   if (!*set && items->options && items->prefix) PetscCall(PetscOptionsFindPair(NULL, items->prefix, name, value, set));
   if (*set && !*value) *value = "";
-  HycoCheck(!*set || strlen(*value) < room, "-%s%s is longer than %d characters", NAMED(items, name), (int)room - 1);
+  HycoCheckValue(!*set || strlen(*value) < room, "-%s%s is longer than %d characters", NAMED(items, name),
+                 (int)room - 1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -295,8 +296,8 @@ PetscErrorCode HycoOptionsReal_Private(HycoOptionItems items, const char name[],
   /* The negated comparison also refuses not a number. */
   number = HycoNumber(word, &end);
   if (end == word || *end != '\0' || !(number >= lo && number <= hi))
-    HycoFail("-%s%s is \"%.500s\"; it must be a number from %g to %g", NAMED(items, name), word, (double)lo,
-             (double)hi);
+    HycoFailAs(HYCO_ERR_VALUE, "-%s%s is \"%.500s\"; it must be a number from %g to %g", NAMED(items, name), word,
+               (double)lo, (double)hi);
   *value = number;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -319,9 +320,10 @@ PetscErrorCode HycoOptionsInt_Private(HycoOptionItems items, const char name[], 
   number = strtol(word, &end, 10);
   if (end == word || *end != '\0' || errno || number < lo || number > hi) {
     if (hi == PETSC_MAX_INT)
-      HycoFail("-%s%s is \"%.500s\"; it must be a whole number, at least %d", NAMED(items, name), word, (int)lo);
-    HycoFail("-%s%s is \"%.500s\"; it must be a whole number from %d to %d", NAMED(items, name), word, (int)lo,
-             (int)hi);
+      HycoFailAs(HYCO_ERR_VALUE, "-%s%s is \"%.500s\"; it must be a whole number, at least %d", NAMED(items, name),
+                 word, (int)lo);
+    HycoFailAs(HYCO_ERR_VALUE, "-%s%s is \"%.500s\"; it must be a whole number from %d to %d", NAMED(items, name), word,
+               (int)lo, (int)hi);
   }
   *value = (PetscInt)number;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -338,7 +340,7 @@ static PetscErrorCode FindWord(HycoOptionItems items, const char name[], const c
     if (strcasecmp(word, words[*index]) == 0) PetscFunctionReturn(PETSC_SUCCESS);
     PetscCall(HycoListAdd(list, ", ", words[*index]));
   }
-  HycoFail("-%s%s is \"%.200s\"; it must be one of: %s", NAMED(items, name), word, list);
+  HycoFailAs(HYCO_ERR_VALUE, "-%s%s is \"%.200s\"; it must be one of: %s", NAMED(items, name), word, list);
 }
 
 /* An option without a value is true. */
@@ -393,7 +395,7 @@ PetscErrorCode HycoOptionsString_Private(HycoOptionItems items, const char name[
   PetscCall(Find(items, name, text, "<text>", value, length, &word, &given));
   if (set) *set = given;
   if (!given) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheck(word[0], "-%s%s needs a value", NAMED(items, name));
+  HycoCheckValue(word[0], "-%s%s needs a value", NAMED(items, name));
   PetscCall(PetscStrncpy(value, word, length));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

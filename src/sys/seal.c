@@ -79,7 +79,7 @@ static PetscErrorCode Open(const char path[], FILE **file, size_t *size)
 
   PetscFunctionBegin;
   *file = fopen(path, "rb");
-  HycoCheck(*file, "%s cannot be opened: no such file, or not readable", path);
+  HycoCheckFile(*file, "%s cannot be opened: no such file, or not readable", path);
   if (fstat(fileno(*file), &info) != 0 || !S_ISREG(info.st_mode)) {
     fclose(*file);
     HycoFail("%s is not a file; give a file that hyco has written, for example a model (.h5) of hyco train", path);

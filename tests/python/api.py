@@ -48,6 +48,15 @@ same = again.outputs == s.outputs and p.outputs['lift'].shape == (5, 3)
 sums = [s.outputs['lift'], s.balance < 1e-9, p.outputs['lift'].sum(), p.contact_forces.sum(), np.abs(p.displacement).sum(), one.outputs['lift'], float(same)]
 sys.stdout.write('sums ' + ' '.join(repr(float(x)) for x in sums) + '\n')
 sys.stdout.flush()
+mine = hyco.Model(sys.argv[2]).predict(np.full((4 + hyco.rank(), 2), [0.03 + 0.01 * hyco.rank(), 900]))
+alone = [hyco.Model(sys.argv[2]).predict(x).outputs['lift'] for x in mine.mu]
+np.testing.assert_allclose(mine.outputs['lift'], alone, rtol=1e-9)
+try:
+    hyco.Model(sys.argv[2]).predict([[0.03, 900], [0.03 + 9 * hyco.rank(), 900]])
+    sys.stdout.write('own accepted\n')
+except ValueError as error:
+    sys.stdout.write('own points[1]\n' if 'points[1]' in str(error) else str(error))
+sys.stdout.flush()
 if sys.argv[3:] and hyco.rank() == 0:
     raise RuntimeError('one process alone')
 if sys.argv[3:]:
@@ -235,21 +244,96 @@ class Python(Case):
             np.testing.assert_allclose(g.times[1, :, 0, 0], report['gradient_times']['long']['pull'], rtol=1e-9)
 
     def test_threads(self):
-        """Threads take turns: their predictions are those of one."""
+        """Threads on one Model or Scene each get their own answers, and their own last prediction; one that has none sees the last of all."""
         import threading  # pylint: disable=import-outside-toplevel
-        models = [self.hyco_py.Model(MODEL) for _ in range(3)]
-        points = np.linspace([0.05, -0.05], [0.25, 0.5], 200)
-        expected, found = models[0].predict(points).total_contact_force, {}
-        workers = [threading.Thread(target=lambda m=m, k=k: found.update({k: [m.predict(x).total_contact_force for x in points]})) for k, m in enumerate(models)]
-        for worker in workers:
-            worker.start()
-        for worker in workers:
-            worker.join()
-        for k in range(3):
-            np.testing.assert_allclose(found[k], expected, rtol=1e-12)
-        self.assertEqual(models[0].predict([0.3, 0.2], extrapolate=True, check=False).shape, ())
+        model, n = self.hyco_py.Model(MODEL), 60
+        points = np.linspace([0.06, 0.0], [0.24, 0.45], 3)
+        expected, wrong, turn = model.predict(points).total_contact_force, [], threading.Barrier(3)
+
+        def predict(k):
+            for _ in range(n):
+                if abs(model.predict(points[k]).total_contact_force - expected[k]) > 1e-9 * expected[k]:
+                    wrong.append(k)
+            turn.wait(60 * PATIENCE)
+            if abs(model.whole_displacement() - alone[k]).max() > 0:
+                wrong.append(f'displacement of {k}')
+
+        def solve(k):
+            for _ in range(3):
+                s = scene.solve([0.02 + 0.01 * k, 900])
+                if list(s.mu) != [0.02 + 0.01 * k, 900] or abs(s.total_contact_force / loads[k] - 1) > 1e-6:
+                    wrong.append(f'solution {k}')
+
+        alone = []
+        for point in points:
+            model.predict(point)
+            alone.append(model.whole_displacement())
+        with self.hyco_py.Scene('block.yaml') as scene:
+            loads = [scene.solve([0.02 + 0.01 * k, 900]).total_contact_force for k in range(3)]
+            for work in (predict, solve):
+                workers = [threading.Thread(target=work, args=(k,)) for k in range(3)]
+                for worker in workers:
+                    worker.start()
+                for worker in workers:
+                    worker.join()
+        self.assertEqual(wrong, [])
+        other = self.hyco_py.Model(MODEL)
+        worker = threading.Thread(target=other.predict, args=(points[1],))
+        worker.start()
+        worker.join()
+        np.testing.assert_array_equal(other.whole_displacement(), alone[1])
+        self.assertEqual(model.predict([0.3, 0.2], extrapolate=True, check=False).shape, ())
         with self.assertRaises(self.hyco_py.Error):
-            models[0].predict([0.3, 0.2])
+            model.predict([0.3, 0.2])
+
+    def test_kinds_of_errors(self):
+        """An Error is also a ValueError or a FileNotFoundError where it means that; of many points it names the wrong one by its number."""
+        hyco = self.hyco_py
+        with hyco.Model(MODEL) as model, hyco.Scene('block.yaml') as scene:
+            for do, kind, words in ((lambda: model.predict([7, 0.17]), ValueError, ['mu1']),
+                                    (lambda: model.predict([[0.07, 0.17], [0.1, 0.2], [7, 0.17]]), ValueError, ['points[2]', 'mu1']),
+                                    (lambda: model.gradient([[0.07, 0.17], [7, 0.17]]), ValueError, ['points[1]']),
+                                    (lambda: model.predict([0.1]), ValueError, ['mu1']), (lambda: scene.solve({'press': 1}), ValueError, ['modulus']),
+                                    (lambda: scene.train('x.h5', points=[[0.03, 900], [0.03, 9]]), ValueError, ['points[1]', 'modulus']),
+                                    (lambda: scene.train('x.h5', grid=[3, 3], validation=[[0.03, 9]]), ValueError, ['validation[0]', 'modulus']),
+                                    (lambda: hyco.Scene('block.yaml', hyco_pod_tool=1), ValueError, ['hyco_pod_tol']),
+                                    (lambda: hyco.Scene('block.yaml', hyco_pod_tol=9).train('x.h5', grid=[2, 2]), ValueError, ['hyco_pod_tol']),
+                                    (lambda: hyco.Scene('block.yaml', scene_mesh='none.msh').solve([0.03, 900]), FileNotFoundError, ['none.msh']),
+                                    (lambda: hyco.Scene('none'), FileNotFoundError, ['none']), (lambda: hyco.Model('none.h5'), FileNotFoundError, ['none.h5']),
+                                    (lambda: hyco.Model('block.msh'), ValueError, ['block.msh'])):
+                with self.assertRaises(kind) as caught:
+                    do()
+                self.assertIsInstance(caught.exception, hyco.Error)
+                for word in words:
+                    self.assertIn(word, str(caught.exception))
+
+    def test_shown_and_pickled(self):
+        """Objects say what they are; a model is pickled with its contents, results and exceptions as they are."""
+        import pickle  # pylint: disable=import-outside-toplevel
+        hyco, name = self.hyco_py, 'pickled.h5'
+        with open(MODEL, 'rb') as file, open(name, 'wb') as copy:
+            copy.write(file.read())
+        with hyco.Scene('block.yaml') as scene, hyco.Model(name) as model:
+            solution, one, many = scene.solve([0.03, 900]), model.predict([0.07, 0.17]), model.predict([[0.07, 0.17], [0.1, 0.2]])
+            for thing, words in ((scene, ['Scene', 'block.yaml', 'press', 'lift']), (model, ['Model', name, model.type, 'mu1']),
+                                 (solution, ['Solution', 'press 0.03', 'lift', 'converged']), (one, ['Prediction', 'mu1 0.07', 'converged']),
+                                 (many, ['2 points']), (scene.gradient([0.03, 900]), ['Gradient', 'lift'])):
+                for word in words:
+                    self.assertIn(word, repr(thing))
+            model.predict([0.07, 0.17])
+            displacement, text = model.whole_displacement(), pickle.dumps(model)
+            there = pickle.loads(text)
+            os.remove(name)
+            elsewhere = pickle.loads(text)
+            for other in (there, elsewhere):
+                self.assertEqual(other.predict([0.07, 0.17]).total_contact_force, one.total_contact_force)
+            np.testing.assert_array_equal(elsewhere.whole_displacement(), displacement)
+            self.assertEqual(pickle.loads(pickle.dumps(many)).data.tobytes(), many.data.tobytes())
+            np.testing.assert_array_equal(pickle.loads(pickle.dumps(solution)).displacement, solution.displacement)
+            with self.assertRaises(OSError):
+                pickle.dumps(model)
+        error = pickle.loads(pickle.dumps(hyco.NotConverged('line', one)))
+        self.assertEqual((str(error), error.result.total_contact_force), ('line', one.total_contact_force))
 
     def test_errors(self):
         """Each error is an exception with the command's line, nothing is printed, and the same objects work afterwards."""
@@ -318,7 +402,51 @@ print(model.predict([0.07, 0.17]).total_contact_force)
             self.assertFalse(os.path.exists('stopped.h5'))
             self.assertTrue(scene.solve([4.06, 0.5]).converged)
 
-    def test_threads(self):
+    def test_ctrl_c(self):
+        """Ctrl-C during a training, a batch and a path is a KeyboardInterrupt between two solves; a handler that returns lets the call go on;
+        solutions are kept, and the same objects work afterwards."""
+        import signal  # pylint: disable=import-outside-toplevel
+        hyco, pid, seen = self.hyco_py, os.getpid(), []
+
+        def asked(do, handler=signal.default_int_handler):
+            """The signal comes before the library's first solve of the call."""
+            from hyco import _library as c  # pylint: disable=import-outside-toplevel
+            before, begin = signal.signal(signal.SIGINT, handler), c.lib.HycoInterruptBegin
+
+            def sent(ask):
+                begin(ask)
+                if not seen:
+                    os.kill(pid, signal.SIGINT)
+                    seen.append(1)
+            c.lib.HycoInterruptBegin = sent
+            try:
+                seen.clear()
+                return do()
+            finally:
+                c.lib.HycoInterruptBegin = begin
+                signal.signal(signal.SIGINT, before)
+
+        points, told = [[0.07, 0.17]] * 50, []
+        with hyco.Model(MODEL) as model, hyco.Scene('bar.yaml') as path, hyco.Scene('block.yaml', hyco_validation=0, hyco_model_type='hybrid') as scene:
+            for do in (lambda: model.predict(points), lambda: model.predict(points[0]), lambda: path.solve([0.9])):
+                with self.assertRaises(KeyboardInterrupt):
+                    asked(do)
+            self.assertEqual(asked(lambda: model.predict(points), lambda *_: told.append(1)).shape, (50,))
+            self.assertEqual(told, [1])
+
+            def later(done, n):
+                if done == 2:
+                    os.kill(pid, signal.SIGINT)
+            before = signal.signal(signal.SIGINT, signal.default_int_handler)
+            with self.assertRaises(KeyboardInterrupt):
+                scene.train('cut.h5', grid=[3, 3], progress=later)
+            signal.signal(signal.SIGINT, before)
+            self.assertFalse(os.path.exists('cut.h5'))
+            self.assertEqual(len([name for name in os.listdir('cut.h5.snapshots') if name.endswith('.h5')]), 2)
+            self.assertEqual(scene.train('cut.h5', grid=[3, 3]).predict([[0.03, 900]]).shape, (1,))
+            self.assertTrue(path.solve([0.9]).converged)
+
+    def test_blas_threads(self):
         """BLAS, which NumPy may share, has one thread in a call and its own number after it; a variable that chooses the number counts."""
         program = self.path('threads.py')
         with open(program, 'w', encoding='ascii') as file:
@@ -370,13 +498,15 @@ print(lib.openblas_get_corename().decode())"""
                               text=True, timeout=100 * PATIENCE, check=False, env={**os.environ, 'PYTHONPATH': PACKAGE})
 
     def test_ranks(self):
-        """Under mpiexec every process has the answers of one; errors are on all; an exception that nothing catches on one ends all."""
+        """Under mpiexec every process has the answers of one; errors are on all; points of a process's own are its own, with their errors; an exception
+        that nothing catches on one ends all."""
         sums = {}
         for n in (0, 1, 2, 3):
             run = self.ranks(n, model=f'ranks{n}.h5')
             self.assertEqual(run.returncode, 0, run.stdout + run.stderr)
             found = [[float(x) for x in line.split()[1:]] for line in run.stdout.splitlines() if line.startswith('sums')]
             self.assertEqual((len(found), run.stdout.count('refused')), (max(n, 1), max(n, 1)), run.stdout)
+            self.assertEqual((run.stdout.count('own accepted'), run.stdout.count('own points[1]')), (1, max(n, 1) - 1), run.stdout)
             for row in found:
                 np.testing.assert_allclose(row, found[0], rtol=0)
             sums[n] = found[0]
