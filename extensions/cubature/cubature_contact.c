@@ -43,11 +43,10 @@ static PetscErrorCode TakeOneEach(HycoReducer t, PetscBool take[])
 {
   const HycoPairs *pairs = &t->fom->pairs;
   HycoFE fe = t->fom->fe_surface;
-  HycoRows rows;
+  HycoRows rows = {0};
 
   PetscFunctionBegin;
-  PetscCall(HycoRowsCreate(pairs, fe->dim, pairs->n, &rows));
-  PetscCall(HycoContactRows(fe, &t->fom->pairs, rows.start, rows.dof, rows.value, rows.gap));
+  PetscCall(HycoContactRows(fe, &t->fom->pairs, &rows));
   for (PetscInt k = 0; k < pairs->n; k++) {
     const PetscInt first = rows.start[k];
     const PetscInt dof =

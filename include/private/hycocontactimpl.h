@@ -161,10 +161,12 @@ static inline void HycoPairsMasters(const HycoPairs *pairs, PetscInt k, PetscInt
 }
 /* value(slave) - sum of weights times value(master) of contact k, for `dim` values a node; the rest of d is 0. */
 void HycoPairsJump(const HycoPairs *pairs, PetscInt k, PetscInt dim, const PetscReal value[], PetscReal d[3]);
-/* Allocates n more contacts of `width` masters; adds one contact. Contacts are added in the order of the scene's. */
+/* Allocates n more contacts of `width` masters; adds one contact, or masters to the last one. Contacts are added in the
+   order of the scene's. */
 PetscErrorCode HycoPairsReserve(HycoPairs *pairs, PetscInt n, PetscInt width);
 void HycoPairsAppend(HycoPairs *pairs, PetscInt contact, PetscInt slave, PetscInt n, const PetscInt node[],
                      const PetscReal weight[]);
+void HycoPairsAddMasters(HycoPairs *pairs, PetscInt n, const PetscInt node[], const PetscReal weight[]);
 /* The contacts which[0..n) with node i renumbered as index[i] (NULL: unchanged), and their search and numbers. The
    caller destroys it. */
 PetscErrorCode HycoPairsSelect(const HycoPairs *pairs, PetscInt n, const PetscInt which[], const PetscInt index[],
@@ -179,19 +181,22 @@ PetscInt HycoPairsWidth(const HycoPairs *pairs);
    measured gap is n . (master point - slave), on moved nodes. Fails if surfaces overlap more than the scene allows,
    or if a pair's nodes no longer face each other. */
 PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal[], PetscReal gap[]);
-/*
-  The rows of B over the free unknowns, in CSR over local dofs (node * dim + component), and D minus the contribution of
-  the fixed unknowns: start[n + 1], dof[], value[] (room for HycoPairsWidth() dim n entries). Fails if a row has no free
-  unknown and the prescribed displacements penetrate.
-*/
-PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
-                               PetscReal gap[]);
+/* Rows of B over the free unknowns, in CSR over local dofs (node * dim + component), and gaps D. Zero before the first
+   use; the functions that compute them also give them room, because mortars may meet more masters at each position. */
+typedef struct {
+  PetscInt *start, *dof, n, room; /* n: rows; room: of dof and value */
+  PetscReal *value, *gap;
+  PetscBool filled; /* HycoContactRows() was called */
+} HycoRows;
+PetscErrorCode HycoRowsDestroy(HycoRows *rows);
+/* The rows at fe's parameters, one for each contact, and D minus the contribution of the fixed unknowns; masters of moved
+   surfaces are searched before. Fails if a row has no free unknown and the prescribed displacements penetrate. */
+PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, HycoRows *rows);
 /* The same with tangents: contact k has the rows row[k] .. row[k + 1] - 1, its normal, or its normal and dim - 1
-   tangents (unit vectors: tangent, 2 x 3 reals a contact). The entry of `gap` at a tangent's row is the displacement of
-   the slave against the master along it in u (n_dof), minus the contribution of the fixed unknowns. */
+   tangents (unit vectors: tangent, 2 x 3 reals a contact). The gap of a tangent's row is the displacement of the slave
+   against the master along it in u (n_dof), minus the contribution of the fixed unknowns. */
 PetscErrorCode HycoContactTangentRows(HycoFE fe, HycoPairs *pairs, const PetscInt row[], const PetscReal u[],
-                                      PetscReal tangent[], PetscInt start[], PetscInt dof[], PetscReal value[],
-                                      PetscReal gap[]);
+                                      PetscReal tangent[], HycoRows *rows);
 /* Counts contacts that have no free unknown and no effect: empty rows, and fixed nodes at obstacles that are no
    contacts; fails if the prescribed displacements of one of these penetrate. start: of the rows. */
 PetscErrorCode HycoContactCountStill(HycoFE fe, const HycoPairs *pairs, const PetscInt start[], PetscInt *n);

@@ -144,9 +144,8 @@ PetscErrorCode HycoFOMTakeOutReleased(HycoFOM fom, Vec u);
 PetscErrorCode HycoFOMCountDependent(HycoFOM fom, PetscInt *dependent);
 /* The same for m rows and their gaps on one process, displacements u (n_dof) and normal forces lambda; slip: of contacts
    with friction, whose rows have tangents; else NULL: a row for each contact. */
-PetscErrorCode HycoRowsCountDependent(PetscInt m, PetscInt start[], PetscInt dof[], PetscReal value[], PetscReal gap[],
-                                      PetscInt n_dof, const PetscReal u[], const PetscReal lambda[],
-                                      const HycoSlip *slip, PetscInt *dependent);
+PetscErrorCode HycoRowsCountDependent(const HycoRows *rows, PetscInt n_dof, const PetscReal u[],
+                                      const PetscReal lambda[], const HycoSlip *slip, PetscInt *dependent);
 /* Creates distributed vectors of the motions; VecDestroyVecs() destroys them. Collective. */
 PetscErrorCode HycoFOMMotionVectors(HycoFOM fom, const HycoMotions *motions, Vec **v);
 /* Finds the motions of `soft` at the present K, and forgets them. Collective. */

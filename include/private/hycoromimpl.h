@@ -15,13 +15,6 @@ typedef struct _n_HycoResultants *HycoResultants;
 typedef struct _n_HycoFloating *HycoFloating;
 typedef struct _n_HycoBalance *HycoBalance;
 
-/* Rows of B in CSR over dofs of a mesh, and D, as in HycoContactRows(). */
-typedef struct {
-  PetscInt *start, *dof, room; /* room: of dof and value */
-  PetscReal *value, *gap;
-  PetscBool filled; /* HycoRowsFill() was called */
-} HycoRows;
-
 /* Terms of an error estimate (error_estimate.c): log(1 + feature / floor) with a coefficient for each feature, and a
    constant. */
 #define HYCO_ESTIMATE_FEATURES 5
@@ -250,13 +243,8 @@ PetscErrorCode HycoROMSetFE(HycoROM model, HycoHybrid hybrid, PetscInt n, const 
 /* The contacts of a handle: a copy where predictions search for masters, else the model's arrays. Drop frees the copy. */
 PetscErrorCode HycoROMTakePairs(const HycoPairs *of, HycoPairs *own);
 PetscErrorCode HycoROMDropPairs(HycoPairs *own);
-/* Allocates n rows of contacts: one for each of the pairs, or with tangents. */
-PetscErrorCode HycoRowsCreate(const HycoPairs *pairs, PetscInt dim, PetscInt n, HycoRows *rows);
-PetscErrorCode HycoRowsDestroy(HycoRows *rows);
 /* Whether supports of fe hold a displacement of a row of these contacts. */
 PetscBool HycoRowsAreHeld(HycoFE fe, const HycoPairs *pairs);
-/* HycoContactRows(), with more room where mortars meet more masters. */
-PetscErrorCode HycoRowsFill(HycoFE fe, HycoPairs *pairs, HycoRows *rows);
 /* Updates the rows and gaps of all contacts, and U on all nodes of mesh, to the last prediction. */
 PetscErrorCode HycoROMComplete(HycoROM model);
 /* Updates only the rows and gaps; fe: at the last prediction's parameters, on a mesh with the nodes and facets of

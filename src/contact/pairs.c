@@ -17,19 +17,23 @@ PetscErrorCode HycoPairsReserve(HycoPairs *p, PetscInt contacts, PetscInt width)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The room must have been reserved. */
+void HycoPairsAddMasters(HycoPairs *p, PetscInt n, const PetscInt node[], const PetscReal weight[])
+{
+  for (PetscInt a = 0; a < n; a++) {
+    p->master[p->master_start[p->n]] = node[a];
+    p->weight[p->master_start[p->n]++] = weight[a];
+  }
+}
+
 /* The room must have been reserved. Masters' weights add up to 1. */
 void HycoPairsAppend(HycoPairs *p, PetscInt contact, PetscInt slave, PetscInt n, const PetscInt node[],
                      const PetscReal weight[])
 {
-  PetscInt *end = p->master_start + p->n;
-
   p->slave[p->n] = slave;
   p->contact[p->n++] = contact;
-  end[1] = end[0];
-  for (PetscInt a = 0; a < n; a++) {
-    p->master[end[1]] = node[a];
-    p->weight[end[1]++] = weight[a];
-  }
+  p->master_start[p->n] = p->master_start[p->n - 1];
+  HycoPairsAddMasters(p, n, node, weight);
 }
 
 /* Ready for use again after HycoPairsReserve(). facts are borrowed, and queries, a count for the report, stay. */

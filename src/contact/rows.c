@@ -40,13 +40,17 @@ static void AddToRow(HycoFE fe, PetscInt node, PetscReal scale, const PetscReal 
   }
 }
 
-/* Row of contact k along a direction; *n entries so far. */
-static void AddRow(HycoFE fe, const HycoPairs *pairs, PetscInt k, const PetscReal along[3], PetscInt *n, PetscInt dof[],
-                   PetscReal value[], PetscReal *gap)
+/* Row r, of contact k along a direction: slave with the direction, masters with minus the weight times it; fixed unknowns
+   move to D. */
+static void AddRow(HycoFE fe, const HycoPairs *pairs, PetscInt k, const PetscReal along[3], PetscInt r, HycoRows *rows)
 {
-  if (!HycoPairsAlone(fe->scene, pairs, k)) AddToRow(fe, pairs->slave[k], 1, along, n, dof, value, gap);
+  PetscInt n = rows->start[r];
+
+  if (!HycoPairsAlone(fe->scene, pairs, k))
+    AddToRow(fe, pairs->slave[k], 1, along, &n, rows->dof, rows->value, &rows->gap[r]);
   for (PetscInt j = pairs->master_start[k]; j < pairs->master_start[k + 1]; j++)
-    AddToRow(fe, pairs->master[j], -pairs->weight[j], along, n, dof, value, gap);
+    AddToRow(fe, pairs->master[j], -pairs->weight[j], along, &n, rows->dof, rows->value, &rows->gap[r]);
+  rows->start[r + 1] = n;
 }
 
 /* Contacts with the same slave node must have different normals: the share of each in the force would not be unique
@@ -146,42 +150,64 @@ static PetscErrorCode CheckCorners(HycoFE fe, const HycoPairs *pairs, const Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* B and D in CSR: slave with the normal, masters with minus the weight times the normal; fixed unknowns move to D. */
-static PetscErrorCode Rows(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], PetscInt start[],
-                           PetscInt dof[], PetscReal value[], PetscReal gap[])
+PetscErrorCode HycoRowsDestroy(HycoRows *rows)
 {
-  PetscInt n = 0;
-
   PetscFunctionBegin;
-  start[0] = 0;
-  for (PetscInt k = 0; k < pairs->n; k++) {
-    const PetscReal drawn = gap[k];
-
-    AddRow(fe, pairs, k, normal + 3 * k, &n, dof, value, &gap[k]);
-    start[k + 1] = n;
-    /* An empty row has no unknown: its gap is a statement about prescribed displacements. */
-    if (start[k + 1] == start[k] && !HycoPairsAlone(fe->scene, pairs, k))
-      PetscCall(HycoContactCheckStill(fe, pairs, k, drawn, &gap[k]));
-  }
+  HycoFreeAll(&rows->start, &rows->dof, &rows->value, &rows->gap);
+  rows->n = rows->room = 0;
+  rows->filled = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rows of B (start, dof, value: room for HycoPairsWidth() nodes each) and gaps D (length) at the current parameters.
-   Not collective. */
-PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
-                               PetscReal gap[])
+/* Room for n rows, up to `each` for a contact, with the masters of now: after the search of masters alone they are known.
+   One more than needed: arrays of no rows are not NULL. It only grows, since positions repeat along a study. */
+static PetscErrorCode Reserve(HycoFE fe, const HycoPairs *pairs, PetscInt n, PetscInt each, HycoRows *rows)
 {
-  PetscReal *normal;
+  const PetscInt entries = (pairs->n + pairs->master_start[pairs->n]) * fe->dim * each + 1;
+
+  PetscFunctionBegin;
+  if (n != rows->n || !rows->start) {
+    PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(*rows->start), &rows->start));
+    PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(*rows->gap), &rows->gap));
+    rows->n = n;
+  }
+  if (entries > rows->room) {
+    PetscCall(PetscRealloc((size_t)entries * sizeof(*rows->dof), &rows->dof));
+    PetscCall(PetscRealloc((size_t)entries * sizeof(*rows->value), &rows->value));
+    rows->room = entries;
+  }
+  rows->start[0] = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The row of contact k's normal. An empty one has no unknown: its gap is a statement about prescribed displacements. */
+static PetscErrorCode AddNormal(HycoFE fe, const HycoPairs *pairs, PetscInt k, const PetscReal normal[3],
+                                PetscReal drawn, PetscInt r, HycoRows *rows)
+{
+  PetscFunctionBegin;
+  rows->gap[r] = drawn;
+  AddRow(fe, pairs, k, normal, r, rows);
+  if (rows->start[r + 1] == rows->start[r] && !HycoPairsAlone(fe->scene, pairs, k))
+    PetscCall(HycoContactCheckStill(fe, pairs, k, drawn, &rows->gap[r]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Not collective. */
+PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, HycoRows *rows)
+{
+  PetscReal *normal, *drawn;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(3 * pairs->n, &normal));
-  ierr = HycoContactGeometry(fe, pairs, normal, gap);
+  PetscCall(PetscMalloc2(3 * pairs->n, &normal, pairs->n, &drawn));
+  ierr = HycoContactGeometry(fe, pairs, normal, drawn);
   /* With the normals of these parameters: they turn with the bodies. */
   if (!ierr) ierr = CheckCorners(fe, pairs, normal);
-  if (!ierr) ierr = Rows(fe, pairs, normal, start, dof, value, gap);
-  PetscCall(PetscFree(normal));
+  if (!ierr) ierr = Reserve(fe, pairs, pairs->n, 1, rows);
+  for (PetscInt k = 0; k < pairs->n && !ierr; k++) ierr = AddNormal(fe, pairs, k, normal + 3 * k, drawn[k], k, rows);
+  PetscCall(PetscFree2(normal, drawn));
   PetscCall(ierr);
+  rows->filled = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -210,32 +236,27 @@ static void Tangents(PetscInt dim, const PetscReal n[3], PetscReal t[6])
 /* The first row of a contact is that of HycoContactRows(), which has refused parallel normals at one slave before.
    The gap of a tangent is the displacement along it in u. */
 PetscErrorCode HycoContactTangentRows(HycoFE fe, HycoPairs *pairs, const PetscInt row[], const PetscReal u[],
-                                      PetscReal tangent[], PetscInt start[], PetscInt dof[], PetscReal value[],
-                                      PetscReal gap[])
+                                      PetscReal tangent[], HycoRows *rows)
 {
   PetscReal *normal, *drawn;
-  PetscInt n = 0;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(3 * pairs->n, &normal, pairs->n, &drawn));
   ierr = HycoContactGeometry(fe, pairs, normal, drawn);
-  start[0] = 0;
+  if (!ierr) ierr = Reserve(fe, pairs, row[pairs->n], fe->dim, rows);
   for (PetscInt k = 0; k < pairs->n && !ierr; k++) {
     PetscReal jump[3];
 
     /* Any orthonormal pair: the law is isotropic in the plane. */
     Tangents(fe->dim, normal + 3 * k, tangent + 6 * k);
     HycoPairsJump(pairs, k, fe->dim, u, jump);
-    for (PetscInt r = row[k]; r < row[k + 1]; r++) {
-      const PetscReal *along = r == row[k] ? normal + 3 * k : tangent + 6 * k + 3 * (r - row[k] - 1);
+    ierr = AddNormal(fe, pairs, k, normal + 3 * k, drawn[k], row[k], rows);
+    for (PetscInt r = row[k] + 1; r < row[k + 1]; r++) {
+      const PetscReal *along = tangent + 6 * k + 3 * (r - row[k] - 1);
 
-      gap[r] = r == row[k] ? drawn[k] : HycoPairsAlone(fe->scene, pairs, k) ? 0 : HycoDot(jump, along);
-      AddRow(fe, pairs, k, along, &n, dof, value, &gap[r]);
-      start[r + 1] = n;
-      /* No free unknown on either side: the gap must hold by itself. */
-      if (r == row[k] && start[r + 1] == start[r] && !HycoPairsAlone(fe->scene, pairs, k))
-        ierr = HycoContactCheckStill(fe, pairs, k, drawn[k], &gap[r]);
+      rows->gap[r] = HycoPairsAlone(fe->scene, pairs, k) ? 0 : HycoDot(jump, along);
+      AddRow(fe, pairs, k, along, r, rows);
     }
   }
   PetscCall(PetscFree2(normal, drawn));

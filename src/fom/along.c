@@ -233,16 +233,15 @@ PetscErrorCode HycoAlongImbalance(HycoAlong a, PetscInt parameter, PetscReal ste
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoAlongRows(HycoAlong a, PetscInt parameter, PetscReal step, PetscInt start[], PetscInt dof[],
-                             PetscReal value[], PetscReal gap[])
+PetscErrorCode HycoAlongRows(HycoAlong a, PetscInt parameter, PetscReal step, HycoRows *rows)
 {
   HycoFOM f = a->f;
 
   PetscFunctionBegin;
   PetscCheck(a->n_dof == f->fe_surface->n_dof, PETSC_COMM_SELF, PETSC_ERR_PLIB, "the surfaces changed along a path");
   for (PetscInt k = 0; k < a->n_dof; k++) a->moved[k] = a->u_old[k] + step * a->du_old[parameter * a->n_dof + k];
-  PetscCall(HycoContactTangentRows(f->fe_surface, &f->pairs, HycoFrictionSlip(f->friction)->row, a->moved, a->tangent,
-                                   start, dof, value, gap));
+  PetscCall(
+      HycoContactTangentRows(f->fe_surface, &f->pairs, HycoFrictionSlip(f->friction)->row, a->moved, a->tangent, rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -388,15 +387,10 @@ PetscErrorCode HycoAlongTake(HycoAlong a, const PetscReal mu[], const HycoDiffer
 /* Those of a->tangent where the contacts are now. */
 static PetscErrorCode Tangents(HycoAlong a)
 {
-  HycoFOM f = a->f;
-  const PetscInt rows = HycoFrictionSlip(f->friction)->row[f->pairs.n];
-  const PetscInt entries = HycoPairsWidth(&f->pairs) * f->fe->dim * rows;
-  PetscInt *start, *dof;
-  PetscReal *value, *gap;
+  HycoRows rows = {0};
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc4(rows + 1, &start, entries, &dof, entries, &value, rows, &gap));
-  HycoFinally(HycoAlongRows(a, 0, 0, start, dof, value, gap), PetscCall(PetscFree4(start, dof, value, gap)));
+  HycoFinally(HycoAlongRows(a, 0, 0, &rows), PetscCall(HycoRowsDestroy(&rows)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

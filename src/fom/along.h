@@ -23,8 +23,7 @@ PetscBool HycoAlongFlows(HycoAlong along);
    fixed. */
 PetscErrorCode HycoAlongImbalance(HycoAlong along, PetscInt parameter, PetscReal step, PetscReal u[], PetscReal r[]);
 /* The rows with tangents at the parameters of fe_surface, `step` along a parameter. Not collective. */
-PetscErrorCode HycoAlongRows(HycoAlong along, PetscInt parameter, PetscReal step, PetscInt start[], PetscInt dof[],
-                             PetscReal value[], PetscReal gap[]);
+PetscErrorCode HycoAlongRows(HycoAlong along, PetscInt parameter, PetscReal step, HycoRows *rows);
 /* The coefficients there at the contacts' first rows, 0 at others. Not collective. */
 PetscErrorCode HycoAlongCoefficients(HycoAlong along, PetscReal mu[]);
 /* Adds what the step changes in the derivatives of the work: L and w = D - B U with their derivatives. */

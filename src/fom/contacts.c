@@ -157,9 +157,10 @@ static PetscErrorCode UnpackContacts(HycoMesh m, PetscInt n, const Sent sent[], 
     PetscInt master[HYCO_FACET_NODES];
 
     for (PetscInt j = 0; j < sent[k].n; j++) master[j] = PlaceOf(&places, sent[k].master[j]);
-    /* Append opens a new contact; this one goes on with the last. */
-    if (sent[k].more) p->n--; /* to the masters of the contact before */
-    HycoPairsAppend(p, sent[k].contact, PlaceOf(&places, sent[k].slave), sent[k].n, master, sent[k].weight);
+    if (sent[k].more)
+      HycoPairsAddMasters(p, sent[k].n, master, sent[k].weight);
+    else
+      HycoPairsAppend(p, sent[k].contact, PlaceOf(&places, sent[k].slave), sent[k].n, master, sent[k].weight);
   }
   PetscCall(PetscFree2(places.global, places.node));
   PetscFunctionReturn(PETSC_SUCCESS);

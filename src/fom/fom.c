@@ -287,22 +287,12 @@ PetscErrorCode HycoFOMGetSolver(HycoFOM f, HycoSolver *solver)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rows of B of one process. */
-typedef struct {
-  PetscInt *start, *dof;
-  PetscReal *value;
-} Rows;
-
 /* The rows and gaps of a process's contacts, and how many have no effect. The caller frees the rows, also after an
-   error. The widths bound the room: no counting pass is needed. */
-static PetscErrorCode ComputeRows(HycoFE fe, HycoPairs *pairs, PetscInt width, Rows *r, PetscReal gap[],
-                                  PetscInt *n_still)
+   error. */
+static PetscErrorCode ComputeRows(HycoFE fe, HycoPairs *pairs, HycoRows *r, PetscInt *n_still)
 {
-  const PetscInt entries = width * fe->dim * pairs->n;
-
   PetscFunctionBegin;
-  PetscCall(PetscMalloc3(pairs->n + 1, &r->start, entries, &r->dof, entries, &r->value));
-  PetscCall(HycoContactRows(fe, pairs, r->start, r->dof, r->value, gap));
+  PetscCall(HycoContactRows(fe, pairs, r));
   PetscCall(HycoContactCountStill(fe, pairs, r->start, n_still));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -310,21 +300,18 @@ static PetscErrorCode ComputeRows(HycoFE fe, HycoPairs *pairs, PetscInt width, R
 /* The same for all contacts on rank 0, for the error of the first of them. */
 static PetscErrorCode ComputeWhole(HycoFOM f, HycoMesh mesh, HycoPairs *pairs)
 {
-  Rows r = {NULL, NULL, NULL};
-  PetscReal *gap;
+  HycoRows r = {0};
   PetscInt n_still;
   HycoFE fe;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoFECreate(f->scene, mesh->dm, &fe));
-  PetscCall(PetscMalloc1(pairs->n, &gap));
   ierr = HycoFESetParameters(fe, f->fe->mu);
   /* A whole-mesh decision: the surface alone cannot tell whether a map mirrors a body. */
   if (!ierr) ierr = PetscArraycpy(fe->mirrored, f->fe->mirrored, f->scene->n_bodies);
-  if (!ierr) ierr = ComputeRows(fe, pairs, f->width, &r, gap, &n_still);
-  PetscCall(PetscFree3(r.start, r.dof, r.value));
-  PetscCall(PetscFree(gap));
+  if (!ierr) ierr = ComputeRows(fe, pairs, &r, &n_still);
+  PetscCall(HycoRowsDestroy(&r));
   PetscCall(HycoFEDestroy(&fe));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -353,14 +340,14 @@ static PetscErrorCode RaiseWhole(HycoFOM f)
 }
 
 /* Computes each rank's rows; an error of any is raised on all. */
-static PetscErrorCode AllRows(HycoFOM f, Rows *r)
+static PetscErrorCode AllRows(HycoFOM f, HycoRows *r)
 {
   char message[HYCO_LINE] = "";
   PetscBool failed;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  HycoCatch(ComputeRows(f->fe_surface, &f->pairs, f->width, r, f->gap, &f->summary.n_still), ierr, message);
+  HycoCatch(ComputeRows(f->fe_surface, &f->pairs, r, &f->summary.n_still), ierr, message);
   failed = (PetscBool)(message[0] != '\0');
   HycoAllreduce(&failed, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
   /* On rank 0 with all contacts: the first error in the order of one rank, the same line on any number. */
@@ -372,12 +359,13 @@ static PetscErrorCode AllRows(HycoFOM f, Rows *r)
 
 /* Sets D and, if the parameters that it depends on have changed, B. Rows are set by INSERT_VALUES, as each contact
    has one row. */
-static PetscErrorCode Insert(HycoFOM f, PetscBool rows_changed, const Rows *r)
+static PetscErrorCode Insert(HycoFOM f, PetscBool rows_changed, const HycoRows *r)
 {
   const PetscInt dim = f->part->dim;
   PetscInt *column, first;
 
   PetscFunctionBegin;
+  PetscCall(PetscArraycpy(f->gap, r->gap, f->pairs.n));
   PetscCall(HycoVecWrite(f->D, f->pairs.n, f->gap));
   if (!rows_changed) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatGetOwnershipRange(f->B, &first, NULL));
@@ -412,7 +400,7 @@ static PetscErrorCode FindMasters(HycoFOM f, PetscBool *wider)
 /* B and B^T (explicit, since PETSc's products with a parallel transpose are slower) and D. Collective. */
 static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
 {
-  Rows r = {NULL, NULL, NULL};
+  HycoRows r = {0};
   PetscBool wider;
   PetscErrorCode ierr;
 
@@ -427,7 +415,7 @@ static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
     PetscCall(MatZeroEntries(f->B));
   ierr = AllRows(f, &r); /* without contacts there may be obstacles whose nodes are all fixed */
   if (!ierr && f->n_contacts) ierr = Insert(f, rows_changed, &r);
-  PetscCall(PetscFree3(r.start, r.dof, r.value));
+  PetscCall(HycoRowsDestroy(&r));
   PetscCall(ierr);
   if (!f->n_contacts || !rows_changed) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoMatAssemble(f->B));

@@ -8,11 +8,6 @@
 #include <hycopath.h>
 #include <hycolcp.h>
 
-typedef struct {
-  PetscInt m, *start, *dof;
-  PetscReal *value, *gap;
-} Rows;
-
 /* By row, from the contacts' normal forces: a tangent that sticks has that of its normal, since it may give forces to
    others, and others have 0. slip: NULL: a row for each contact. */
 static void RowForces(const HycoSlip *slip, PetscInt m, const PetscReal lambda[], PetscReal force[],
@@ -34,14 +29,14 @@ static void RowForces(const HycoSlip *slip, PetscInt m, const PetscReal lambda[]
 /* Marks rows of contacts whose gap is closed, and that have an unknown. The scale is of all contacts, so that round-off counts
    equally everywhere; two passes, since it is known after the first. 1e-9 of it: a gap that the solver has left by
    round-off is closed. */
-static PetscErrorCode MarkClosed(MPI_Comm comm, const Rows *r, const PetscReal u[], const PetscReal lambda[],
+static PetscErrorCode MarkClosed(MPI_Comm comm, const HycoRows *r, const PetscReal u[], const PetscReal lambda[],
                                  const PetscBool tangent[], PetscBool in[])
 {
   PetscReal scale = 0;
 
   PetscFunctionBegin;
   for (PetscInt pass = 0; pass < 2; pass++) {
-    for (PetscInt k = 0; k < r->m; k++) {
+    for (PetscInt k = 0; k < r->n; k++) {
       PetscReal left = r->gap[k], size = PetscAbsReal(r->gap[k]);
 
       for (PetscInt j = r->start[k]; j < r->start[k + 1]; j++) {
@@ -59,14 +54,14 @@ static PetscErrorCode MarkClosed(MPI_Comm comm, const Rows *r, const PetscReal u
 
 /* In how many of all ranks' rows each unknown of the surface occurs. Collective. Counts are sums over ranks at the
    owners, then sent back. */
-static PetscErrorCode CountRows(HycoFOM f, const Rows *r, const PetscBool in[], PetscReal count[])
+static PetscErrorCode CountRows(HycoFOM f, const HycoRows *r, const PetscBool in[], PetscReal count[])
 {
   const PetscInt n_dof = f->fe_surface->n_dof;
   Vec all, mine;
 
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(count, n_dof));
-  for (PetscInt k = 0; k < r->m; k++) {
+  for (PetscInt k = 0; k < r->n; k++) {
     for (PetscInt j = r->start[k]; in[k] && j < r->start[k + 1]; j++) count[r->dof[j]]++;
   }
   /* One rank: the counts are complete. */
@@ -84,13 +79,13 @@ static PetscErrorCode CountRows(HycoFOM f, const Rows *r, const PetscBool in[], 
 
 /* Removes this rank's rows with an unknown that occurs in no other row, until there are none. An entry below 1e-6
    does not make a row independent in finite precision. */
-static PetscBool PeelOwn(const Rows *r, PetscReal count[], PetscBool in[])
+static PetscBool PeelOwn(const HycoRows *r, PetscReal count[], PetscBool in[])
 {
   PetscBool change = PETSC_TRUE, any = PETSC_FALSE;
 
   while (change) {
     change = PETSC_FALSE;
-    for (PetscInt k = 0; k < r->m; k++) {
+    for (PetscInt k = 0; k < r->n; k++) {
       PetscBool own = PETSC_FALSE;
 
       if (!in[k]) continue;
@@ -109,7 +104,7 @@ static PetscBool PeelOwn(const Rows *r, PetscReal count[], PetscBool in[])
 /* Removes repeatedly the rows with an unknown that occurs in no other row: they are independent. Exact and cheap;
    only what remains needs a dense Gram matrix. Ranks may remove rows at the same time: each counts on an unknown
    that is in no other row. */
-static PetscErrorCode Peel(HycoFOM f, const Rows *r, PetscBool in[])
+static PetscErrorCode Peel(HycoFOM f, const HycoRows *r, PetscBool in[])
 {
   PetscReal *count;
   PetscBool change = PETSC_TRUE;
@@ -128,16 +123,16 @@ static PetscErrorCode Peel(HycoFOM f, const Rows *r, PetscBool in[])
 
 /* The remaining rows of all ranks, with unknowns by their numbers in the distributed vectors, on rank 0. Collective; the
    caller frees them. */
-static PetscErrorCode GatherRest(HycoFOM f, const Rows *r, const PetscBool in[], Rows *rest)
+static PetscErrorCode GatherRest(HycoFOM f, const HycoRows *r, const PetscBool in[], HycoRows *rest)
 {
   const PetscInt dim = f->fe->dim, *global = f->surface->node_global;
   PetscInt n = 0, *end, *dof, n_values, m = 0;
   PetscReal *value;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc3(r->m, &end, r->start[r->m], &dof, r->start[r->m], &value));
+  PetscCall(PetscMalloc3(r->n, &end, r->start[r->n], &dof, r->start[r->n], &value));
   /* Lengths instead of starts: those of several ranks can be concatenated. */
-  for (PetscInt k = 0; k < r->m; k++) {
+  for (PetscInt k = 0; k < r->n; k++) {
     if (in[k]) end[m++] = r->start[k + 1] - r->start[k];
     for (PetscInt j = r->start[k]; in[k] && j < r->start[k + 1]; j++, n++) {
       dof[n] = global ? global[r->dof[j] / dim] * dim + r->dof[j] % dim : r->dof[j];
@@ -146,12 +141,12 @@ static PetscErrorCode GatherRest(HycoFOM f, const Rows *r, const PetscBool in[],
   }
   PetscCall(HycoConcatenate(HycoComm(f), n, dof, MPIU_INT, sizeof(PetscInt), &n_values, &rest->dof));
   PetscCall(HycoConcatenate(HycoComm(f), n, value, MPIU_REAL, sizeof(PetscReal), &n_values, &rest->value));
-  PetscCall(HycoConcatenate(HycoComm(f), m, end, MPIU_INT, sizeof(PetscInt), &rest->m, &rest->start));
+  PetscCall(HycoConcatenate(HycoComm(f), m, end, MPIU_INT, sizeof(PetscInt), &rest->n, &rest->start));
   PetscCall(PetscFree3(end, dof, value));
-  for (PetscInt k = 0, next = 0; k <= rest->m && rest->start; k++) { /* from lengths to starts */
+  for (PetscInt k = 0, next = 0; k <= rest->n && rest->start; k++) { /* from lengths to starts */
     const PetscInt here = next;
 
-    next += k < rest->m ? rest->start[k] : 0;
+    next += k < rest->n ? rest->start[k] : 0;
     rest->start[k] = here;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -160,9 +155,9 @@ static PetscErrorCode GatherRest(HycoFOM f, const Rows *r, const PetscBool in[],
 /* The number of rows minus their rank; the unknowns are numbered anew, those that occur. Rank 0. By the Gram matrix (n
    x n, dense): n is small after peeling. Each dependent row is a direction in which contact forces are arbitrary while
    displacements are not. */
-static PetscErrorCode Dependent(const Rows *r, PetscInt *dependent)
+static PetscErrorCode Dependent(const HycoRows *r, PetscInt *dependent)
 {
-  const PetscInt n = r->m, n_values = r->start[n];
+  const PetscInt n = r->n, n_values = r->start[n];
   PetscReal *G, *full;
   PetscInt *dof, *at, n_dof = n_values, rank;
 
@@ -192,15 +187,15 @@ static PetscErrorCode Dependent(const Rows *r, PetscInt *dependent)
 }
 
 /* The same for the rows that are marked, on all ranks. A row without force cannot exchange it with others. */
-static PetscErrorCode CountRest(HycoFOM f, const Rows *r, const PetscReal lambda[], const PetscBool in[],
+static PetscErrorCode CountRest(HycoFOM f, const HycoRows *r, const PetscReal lambda[], const PetscBool in[],
                                 PetscInt *dependent)
 {
-  Rows rest = {0, NULL, NULL, NULL, NULL};
+  HycoRows rest = {0};
   PetscBool pressed = PETSC_FALSE;
 
   PetscFunctionBegin;
   *dependent = 0;
-  for (PetscInt k = 0; k < r->m; k++) pressed = (PetscBool)(pressed || (in[k] && lambda[k] > 0));
+  for (PetscInt k = 0; k < r->n; k++) pressed = (PetscBool)(pressed || (in[k] && lambda[k] > 0));
   HycoAllreduce(&pressed, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
   /* Dependent rows without any force: forces 0 are unique. */
   if (!pressed) PetscFunctionReturn(PETSC_SUCCESS);
@@ -212,16 +207,16 @@ static PetscErrorCode CountRest(HycoFOM f, const Rows *r, const PetscReal lambda
 }
 
 /* Rows that share no unknown with another closed row are independent; only the rest needs a rank. */
-static PetscErrorCode Count(HycoFOM f, const HycoSlip *slip, Rows *r, PetscReal force[], PetscBool tangent[],
+static PetscErrorCode Count(HycoFOM f, const HycoSlip *slip, HycoRows *r, PetscReal force[], PetscBool tangent[],
                             PetscBool in[], PetscInt *dependent)
 {
   PetscFunctionBegin;
   if (slip)
-    HycoOnEach(HycoComm(f), HycoContactTangentRows(f->fe_surface, &f->pairs, slip->row, f->u_surface, slip->tangent,
-                                                   r->start, r->dof, r->value, r->gap));
+    HycoOnEach(HycoComm(f),
+               HycoContactTangentRows(f->fe_surface, &f->pairs, slip->row, f->u_surface, slip->tangent, r));
   else
-    HycoOnEach(HycoComm(f), HycoContactRows(f->fe_surface, &f->pairs, r->start, r->dof, r->value, r->gap));
-  RowForces(slip, r->m, f->lambda, force, tangent);
+    HycoOnEach(HycoComm(f), HycoContactRows(f->fe_surface, &f->pairs, r));
+  RowForces(slip, r->n, f->lambda, force, tangent);
   PetscCall(MarkClosed(HycoComm(f), r, f->u_surface, force, tangent, in));
   PetscCall(Peel(f, r, in));
   PetscCall(CountRest(f, r, force, in, dependent));
@@ -233,46 +228,44 @@ PetscErrorCode HycoFOMCountDependent(HycoFOM f, PetscInt *dependent)
 {
   const HycoSlip *slip = f->friction ? HycoFrictionSlip(f->friction) : NULL;
   const PetscInt m = slip ? slip->row[slip->n] : f->pairs.n;
-  const size_t entries = (size_t)HycoPairsWidth(&f->pairs) * (size_t)f->fe->dim * (size_t)m;
-  Rows r = {m, NULL, NULL, NULL, NULL};
+  HycoRows r = {0};
   PetscReal *force;
   PetscBool *in, *tangent;
 
   PetscFunctionBegin;
-  PetscCall(
-      PetscMalloc7(m + 1, &r.start, entries, &r.dof, entries, &r.value, m, &r.gap, m, &in, m, &force, m, &tangent));
-  HycoFinally(Count(f, slip, &r, force, tangent, in, dependent),
-              PetscCall(PetscFree7(r.start, r.dof, r.value, r.gap, in, force, tangent)));
+  PetscCall(PetscMalloc3(m, &in, m, &force, m, &tangent));
+  HycoFinally(Count(f, slip, &r, force, tangent, in, dependent), PetscCall(HycoRowsDestroy(&r));
+              PetscCall(PetscFree3(in, force, tangent)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The marked rows, which the caller frees. */
-static PetscErrorCode TakeRest(const Rows *r, const PetscBool in[], Rows *rest)
+static PetscErrorCode TakeRest(const HycoRows *r, const PetscBool in[], HycoRows *rest)
 {
   PetscInt n = 0;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(r->m + 1, &rest->start));
-  PetscCall(PetscMalloc1(r->start[r->m] + 1, &rest->dof));
-  PetscCall(PetscMalloc1(r->start[r->m] + 1, &rest->value));
+  PetscCall(PetscMalloc1(r->n + 1, &rest->start));
+  PetscCall(PetscMalloc1(r->start[r->n] + 1, &rest->dof));
+  PetscCall(PetscMalloc1(r->start[r->n] + 1, &rest->value));
   rest->start[0] = 0;
-  for (PetscInt k = 0; k < r->m; k++) {
+  for (PetscInt k = 0; k < r->n; k++) {
     for (PetscInt j = r->start[k]; in[k] && j < r->start[k + 1]; j++) {
       rest->dof[n] = r->dof[j];
       rest->value[n++] = r->value[j];
     }
     /* After its entries: starts are those of the next row. */
-    if (in[k]) rest->start[++rest->m] = n;
+    if (in[k]) rest->start[++rest->n] = n;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The same for the rows of a reduced system, on one process; dof < n_dof. */
-PetscErrorCode HycoRowsCountDependent(PetscInt m, PetscInt start[], PetscInt dof[], PetscReal value[], PetscReal gap[],
-                                      PetscInt n_dof, const PetscReal u[], const PetscReal lambda[],
+PetscErrorCode HycoRowsCountDependent(const HycoRows *r, PetscInt n_dof, const PetscReal u[], const PetscReal lambda[],
                                       const HycoSlip *slip, PetscInt *dependent)
 {
-  Rows r = {m, start, dof, value, gap}, rest = {0, NULL, NULL, NULL, NULL};
+  const PetscInt m = r->n;
+  HycoRows rest = {0};
   PetscReal *count, *force;
   PetscBool *in, *tangent, pressed = PETSC_FALSE;
 
@@ -281,16 +274,16 @@ PetscErrorCode HycoRowsCountDependent(PetscInt m, PetscInt start[], PetscInt dof
   PetscCall(PetscMalloc3(m, &in, m, &force, m, &tangent));
   RowForces(slip, m, lambda, force, tangent);
   PetscCall(PetscCalloc1(n_dof + 1, &count));
-  PetscCall(MarkClosed(PETSC_COMM_SELF, &r, u, force, tangent, in));
+  PetscCall(MarkClosed(PETSC_COMM_SELF, r, u, force, tangent, in));
   for (PetscInt k = 0; k < m; k++) {
-    for (PetscInt j = start[k]; in[k] && j < start[k + 1]; j++) count[dof[j]]++;
+    for (PetscInt j = r->start[k]; in[k] && j < r->start[k + 1]; j++) count[r->dof[j]]++;
   }
   /* Once: on one process rows leave in one sweep, and those that stay are few. */
-  (void)PeelOwn(&r, count, in);
+  (void)PeelOwn(r, count, in);
   for (PetscInt k = 0; k < m; k++) pressed = (PetscBool)(pressed || (in[k] && force[k] > 0));
   /* Without a force nothing can be redistributed. */
   if (pressed) {
-    PetscCall(TakeRest(&r, in, &rest));
+    PetscCall(TakeRest(r, in, &rest));
     PetscCall(Dependent(&rest, dependent));
   }
   PetscCall(PetscFree3(in, force, tangent));

@@ -150,24 +150,17 @@ PetscErrorCode HycoFrictionBegin(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rows of B and gaps of this rank. */
-typedef struct {
-  PetscInt *start, *dof;
-  PetscReal *value, *gap;
-} Rows;
-
 /* Local: the coefficients may be invalid on one rank only, so that the caller wraps it in HycoOnEach(). */
-static PetscErrorCode ComputeRows(HycoFOM f, HycoFriction r, Rows *rows)
+static PetscErrorCode ComputeRows(HycoFOM f, HycoFriction r, HycoRows *rows)
 {
   PetscFunctionBegin;
   PetscCall(HycoSlipCoefficients(&r->slip, f->fe_surface, &f->pairs));
-  PetscCall(HycoContactTangentRows(f->fe_surface, &f->pairs, r->slip.row, r->u_old, r->slip.tangent, rows->start,
-                                   rows->dof, rows->value, rows->gap));
+  PetscCall(HycoContactTangentRows(f->fe_surface, &f->pairs, r->slip.row, r->u_old, r->slip.tangent, rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* B and its transpose anew. As many entries in a tangential row as in a normal one, hence the same room. */
-static PetscErrorCode FillB(HycoFOM f, HycoFriction r, const Rows *rows)
+static PetscErrorCode FillB(HycoFOM f, HycoFriction r, const HycoRows *rows)
 {
   const PetscInt dim = f->fe->dim, entries = f->width * dim, *global = f->surface->node_global;
   PetscInt first, *column;
@@ -197,7 +190,7 @@ static PetscErrorCode FillB(HycoFOM f, HycoFriction r, const Rows *rows)
 }
 
 /* The order matters: rows need the coefficients, Use() needs the matrices of the system to which it may change. */
-static PetscErrorCode Assemble(HycoFOM f, HycoFriction r, Rows *rows)
+static PetscErrorCode Assemble(HycoFOM f, HycoFriction r, HycoRows *rows)
 {
   PetscBool rubs;
 
@@ -243,14 +236,11 @@ static PetscErrorCode Extrapolate(HycoFOM f)
 PetscErrorCode HycoFrictionAssemble(HycoFOM f)
 {
   HycoFriction r = f->friction;
-  /* width: the most nodes of a contact. */
-  const PetscInt entries = f->width * f->fe->dim * r->rows;
-  Rows rows;
+  HycoRows rows = {0};
 
   PetscFunctionBegin;
   PetscCheck(r->n_dof == f->fe_surface->n_dof, PETSC_COMM_SELF, PETSC_ERR_PLIB, "the surfaces changed along a path");
-  PetscCall(PetscMalloc4(r->rows + 1, &rows.start, entries, &rows.dof, entries, &rows.value, r->rows, &rows.gap));
-  HycoFinally(Assemble(f, r, &rows), PetscCall(PetscFree4(rows.start, rows.dof, rows.value, rows.gap)));
+  HycoFinally(Assemble(f, r, &rows), PetscCall(HycoRowsDestroy(&rows)));
   PetscCall(Extrapolate(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

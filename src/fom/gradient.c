@@ -41,26 +41,23 @@ static PetscErrorCode AddContacts(const Work *o, const PetscReal U[], const Pets
                                   PetscReal w[])
 {
   HycoFOM f = o->f;
-  const PetscInt rows = o->rubs ? HycoFrictionSlip(f->friction)->row[f->pairs.n] : f->pairs.n;
-  const PetscInt entries = HycoPairsWidth(&f->pairs) * f->fe_surface->dim * rows;
-  PetscInt *start, *dof;
-  PetscReal *value;
+  HycoRows rows = {0};
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc3(rows + 1, &start, entries, &dof, entries, &value));
   if (o->rubs)
-    ierr = HycoAlongRows(o->along, o->parameter, o->step, start, dof, value, w);
+    ierr = HycoAlongRows(o->along, o->parameter, o->step, &rows);
   else
-    ierr = HycoContactRows(f->fe_surface, &f->pairs, start, dof, value, w);
-  for (PetscInt k = 0; !ierr && k < rows; k++) {
-    for (PetscInt j = start[k]; j < start[k + 1]; j++) {
+    ierr = HycoContactRows(f->fe_surface, &f->pairs, &rows);
+  for (PetscInt k = 0; !ierr && k < rows.n; k++) {
+    w[k] = rows.gap[k];
+    for (PetscInt j = rows.start[k]; j < rows.start[k + 1]; j++) {
       /* A sum over the contacts of this rank; several may share a node. */
-      force[dof[j]] += value[j] * lambda[k];
-      w[k] -= value[j] * U[dof[j]];
+      force[rows.dof[j]] += rows.value[j] * lambda[k];
+      w[k] -= rows.value[j] * U[rows.dof[j]];
     }
   }
-  PetscCall(PetscFree3(start, dof, value));
+  PetscCall(HycoRowsDestroy(&rows));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -80,18 +80,16 @@ static PetscErrorCode CloseDependent(const Sets *s, PetscInt *lost)
 /* (35)-(36): a contact is in A_lambda if its row acts on a free unknown of A_c. */
 static PetscErrorCode FindContacts(HycoFE fe, HycoPairs *pairs, const Sets *s, PetscInt in_rid[])
 {
-  const PetscInt n = pairs->n, dim = fe->dim, entries = HycoPairsWidth(pairs) * dim * n;
-  PetscInt *start, *dof;
-  PetscReal *value, *gap;
+  HycoRows rows = {0};
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc4(n + 1, &start, entries, &dof, entries, &value, n, &gap));
   /* Rows at the training parameters: empty ones, without a master, are not in A_lambda. */
-  PetscCall(HycoContactRows(fe, pairs, start, dof, value, gap));
-  for (PetscInt k = 0; k < n; k++) {
-    for (PetscInt j = start[k]; j < start[k + 1]; j++) in_rid[k] = in_rid[k] || s->sets[s->index[dof[j] / dim]] == 2;
+  PetscCall(HycoContactRows(fe, pairs, &rows));
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    for (PetscInt j = rows.start[k]; j < rows.start[k + 1]; j++)
+      in_rid[k] = in_rid[k] || s->sets[s->index[rows.dof[j] / fe->dim]] == 2;
   }
-  PetscCall(PetscFree4(start, dof, value, gap));
+  PetscCall(HycoRowsDestroy(&rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -595,23 +595,21 @@ static PetscErrorCode TakeField(HycoReducer t, PetscInt kind, PetscInt divide, P
 static PetscErrorCode SetForces(HycoReducer t, PetscInt k, Mat R)
 {
   HycoFOM f = t->fom;
-  const PetscInt m = t->sizes[2], dim = t->sizes[3], entries = HycoPairsWidth(&f->pairs) * dim * m;
-  PetscInt *start, *dof;
-  PetscReal *value, *gap;
+  const PetscInt m = t->sizes[2], dim = t->sizes[3];
+  HycoRows rows = {0};
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc4(m + 1, &start, entries, &dof, entries, &value, m, &gap));
-  PetscCall(HycoContactRows(f->fe_surface, &f->pairs, start, dof, value, gap));
+  PetscCall(HycoContactRows(f->fe_surface, &f->pairs, &rows));
   for (PetscInt i = 0; i < m; i++) {
-    for (PetscInt j = start[i]; j < start[i + 1]; j++) {
+    for (PetscInt j = rows.start[i]; j < rows.start[i + 1]; j++) {
       /* Rows of B act on the surfaces' mesh; the distributed vectors have global numbers. */
-      const PetscInt node = f->surface->node_global ? f->surface->node_global[dof[j] / dim] : dof[j] / dim;
+      const PetscInt at = rows.dof[j] / dim, node = f->surface->node_global ? f->surface->node_global[at] : at;
 
-      PetscCall(MatSetValue(R, node * dim + dof[j] % dim, k, value[j] * t->Lambda[(size_t)k * (size_t)m + (size_t)i],
-                            ADD_VALUES));
+      PetscCall(MatSetValue(R, node * dim + rows.dof[j] % dim, k,
+                            rows.value[j] * t->Lambda[(size_t)k * (size_t)m + (size_t)i], ADD_VALUES));
     }
   }
-  PetscCall(PetscFree4(start, dof, value, gap));
+  PetscCall(HycoRowsDestroy(&rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

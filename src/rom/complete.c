@@ -2,53 +2,12 @@
    problem uses. */
 #include <hycoromimpl.h>
 
-/* Room for the widest row: entries of B are rewritten at each mu without another allocation. */
-PetscErrorCode HycoRowsCreate(const HycoPairs *pairs, PetscInt dim, PetscInt n, HycoRows *rows)
-{
-  PetscFunctionBegin;
-  rows->room = HycoPairsWidth(pairs) * dim * n;
-  PetscCall(PetscMalloc1(n + 1, &rows->start));
-  PetscCall(PetscMalloc1(rows->room, &rows->dof));
-  PetscCall(PetscMalloc1(rows->room, &rows->value));
-  PetscCall(PetscMalloc1(n, &rows->gap));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The search for masters first, which may widen rows of mortars. */
-PetscErrorCode HycoRowsFill(HycoFE fe, HycoPairs *pairs, HycoRows *rows)
-{
-  PetscInt entries;
-
-  PetscFunctionBegin;
-  PetscCall(HycoPairsMove(fe, pairs));
-  /* An upper bound of the width: exact counts would need the rows themselves. The room only grows, since positions
-     repeat along a study. */
-  entries = HycoPairsWidth(pairs) * fe->dim * pairs->n;
-  if (entries > rows->room) {
-    PetscCall(PetscRealloc((size_t)entries * sizeof(*rows->dof), &rows->dof));
-    PetscCall(PetscRealloc((size_t)entries * sizeof(*rows->value), &rows->value));
-    rows->room = entries;
-  }
-  PetscCall(HycoContactRows(fe, pairs, rows->start, rows->dof, rows->value, rows->gap));
-  rows->filled = PETSC_TRUE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoRowsDestroy(HycoRows *rows)
-{
-  PetscFunctionBegin;
-  HycoFreeAll(&rows->start, &rows->dof, &rows->value, &rows->gap);
-  rows->filled = PETSC_FALSE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Creates fe_beyond without the mesh's cells: their materials are not needed. Created on demand: a prediction of
    displacements in the RID alone needs nothing beyond it. */
 static PetscErrorCode CreateBeyond(HycoROM m)
 {
   PetscFunctionBegin;
   PetscCall(HycoFECreateSurface(m->model->scene, m->model->mesh->dm, &m->fe_beyond));
-  PetscCall(HycoRowsCreate(&m->pairs, m->model->mesh->dim, m->pairs.n, &m->rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -76,7 +35,7 @@ static PetscErrorCode BringRows(HycoROM m, HycoFE fe, const PetscReal mu[])
       (!fe->gap_changed || (fe->supports_only && !fe->n_oblique && !HycoRowsAreHeld(fe, &m->pairs))))
     PetscFunctionReturn(PETSC_SUCCESS);
   fe->ready = PETSC_FALSE; /* until its rows are computed */
-  PetscCall(HycoRowsFill(fe, &m->pairs, &m->rows));
+  PetscCall(HycoContactRows(fe, &m->pairs, &m->rows));
   fe->ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

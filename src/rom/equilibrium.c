@@ -47,7 +47,6 @@ static PetscErrorCode Create(HycoROM m, HycoBalance b)
   PetscFunctionBegin;
   PetscCall(HycoFECreateMatrix(fe, PETSC_COMM_SELF, fe->mesh->n_nodes, 0, &b->K));
   PetscCall(MatCreateVecs(b->K, &b->x, &b->r));
-  PetscCall(HycoRowsCreate(&m->whole_pairs, fe->dim, m->whole_pairs.n, &b->rows));
   PetscCall(PetscMalloc1(fe->n_dof, &b->load));
   PetscCall(PetscMalloc1(fe->mesh->n_cells, &b->energy));
   PetscCall(PetscMalloc1((size_t)n_times * (size_t)m->model->pairs.n + 1, &b->gap));
@@ -157,7 +156,7 @@ static PetscErrorCode MeasureTime(HycoROM m, HycoBalance b, HycoReplay *replay, 
   PetscScalar *r, square;
 
   PetscFunctionBegin;
-  PetscCall(HycoRowsFill(fe, &m->whole_pairs, &b->rows));
+  PetscCall(HycoContactRows(fe, &m->whole_pairs, &b->rows));
   PetscCall(HycoFELoads(fe, b->load));
   HycoFEGeneralise(fe, b->load);
   PetscCall(VecGetArray(b->r, &r));

@@ -371,10 +371,16 @@ static PetscErrorCode RunFrom(Fit *f, const PetscReal start[], const char type[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A minimum is better than a point that is none; then the misfit decides. */
+/* Whether two misfits are those of one minimum. */
+static PetscBool AreSame(PetscReal a, PetscReal b)
+{
+  return (PetscBool)(PetscAbsReal(a - b) <= SAME * PetscMin(a, b) + EXACT);
+}
+
+/* The smaller misfit; of the same ones a minimum. */
 static PetscBool IsBetter(const HycoFit *fit, PetscReal misfit, PetscBool minimum)
 {
-  if (minimum != fit->converged) return minimum;
+  if (minimum != fit->converged && AreSame(misfit, fit->misfit)) return minimum;
   return (PetscBool)(misfit < fit->misfit);
 }
 
@@ -384,7 +390,6 @@ static PetscErrorCode RunAll(Fit *f, const PetscReal starts[], const char type[]
   PetscReal *ends;
 
   PetscFunctionBegin;
-  fit->misfit = PETSC_MAX_REAL;
   PetscCall(PetscMalloc1(fit->n_starts, &ends));
   for (PetscInt s = 0; s < fit->n_starts; s++) {
     char method[64];
@@ -400,7 +405,7 @@ static PetscErrorCode RunAll(Fit *f, const PetscReal starts[], const char type[]
     PetscCall(PetscArraycpy(x, f->x, f->n_par));
   }
   /* Counted afterwards: the least is known only when all starts have ended. */
-  for (PetscInt s = 0; s < fit->n_starts; s++) fit->n_least += ends[s] <= (1 + SAME) * fit->misfit + EXACT;
+  for (PetscInt s = 0; s < fit->n_starts; s++) fit->n_least += AreSame(ends[s], fit->misfit);
   PetscCall(PetscFree(ends));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -52,7 +52,6 @@ PetscErrorCode HycoROMMakeNear(HycoROM m, PetscInt n, const PetscInt contact[])
       PetscCall(HycoFEUseSurfaces(near->fe));
     }
     PetscCall(HycoPairsSelect(&m->pairs, n, contact, NULL, &near->pairs));
-    PetscCall(HycoRowsCreate(&near->pairs, m->model->mesh->dim, near->pairs.n, &near->rows));
     PetscCall(PetscMalloc1(n + 1, &near->Lambda));
     for (PetscInt k = 0; k < n; k++) near->Lambda[k] = m->Lambda[contact[k]];
   }

@@ -30,7 +30,6 @@ PetscErrorCode HycoROMSetUpDefault(HycoROM m)
   m->of_fe = &m->pairs;
   PetscCall(PetscMalloc1(m->m, &m->contact));
   for (PetscInt k = 0; k < m->m; k++) m->contact[k] = k;
-  PetscCall(HycoRowsCreate(&m->pairs, m->model->mesh->dim, m->pairs.n, &m->rows));
   PetscCall(HycoROMSetUpFields(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -107,8 +107,7 @@ static PetscErrorCode MeasureContacts(HycoROM m, HycoPrediction *p)
     p->sliding = PetscMax(p->sliding, m->trace.history.step[k].sliding); /* contacts may be open at the end */
   }
   if (m->model->traits.surfaces && p->reason > 0 && !m->trace.n_listed)
-    PetscCall(HycoRowsCountDependent(m->model->pairs.n, m->rows.start, m->rows.dof, m->rows.value, m->rows.gap,
-                                     m->fe->n_dof, m->U, m->Lambda, NULL, &p->n_dependent));
+    PetscCall(HycoRowsCountDependent(&m->rows, m->fe->n_dof, m->U, m->Lambda, NULL, &p->n_dependent));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -4,7 +4,7 @@ import unittest
 import h5py
 
 import roller
-from common import Case, square
+from common import Case, msh
 
 RANGES = {'lo': -4, 'hi': 4}
 POINTS = ('1.3,0.5,20', '-3.7,1.5,60')
@@ -71,6 +71,27 @@ class Mortar(Case):
         for kind in ('cubature',):
             self.refused('train', '-scene', scene, '-model', self.path('other.h5'), '-grid', '2,2,2', '-hyco_model_type', kind,
                          texts=('contact under has type mortar', f'a model of type {kind} does not take them', 'type: surface'))
+
+    def test_wider_rows(self):
+        """A block of two cells turns on a rail of eight: with the turn its rows meet more masters than as drawn, and models have room for them."""
+        nodes, elements = [], []
+        roller.grid([8, 1], lambda i, j, k: (i, j, 0), nodes, elements, 1, {(1, 0): 11, (1, 1): 12})
+        roller.grid([2, 1], lambda i, j, k: (1 + i, 1 + j, 0), nodes, elements, 2, {(1, 0): 13, (1, 1): 14})
+        msh(self.path('rail.msh'), nodes, elements, {1: (2, 'rail'), 2: (2, 'block'), 11: (1, 'base'), 12: (1, 'upper'), 13: (1, 'under'), 14: (1, 'top')})
+        scene = self.written("""
+scene: {mesh: rail.msh, parameters: [t]}
+parameter: {t: {range: [-0.01, 0.01]}}
+body: {rail: {young: 1000, poisson: 0.3}, block: {young: 2000, poisson: 0.3, map: {x: "2 + (x-2)*cos(t) - (y-1)*sin(t)", y: "1 + (x-2)*sin(t) + (y-1)*cos(t)"}}}
+fixed: {base: {x: 0, y: 0}, top: {x: 0, y: -0.02}}
+contact: {c: {type: mortar, slave: under, master: upper}}
+""")
+        u, forces, _ = self.fields('solve', '-scene', scene, '-mu', '0.01')
+        for kind, *more in (('hybrid',), ('projection', '-hyco_dual', 'snapshots')):
+            self.hyco('train', '-scene', scene, '-model', self.path('m.h5'), '-grid', '7', '-hyco_model_type', kind, '-hyco_validation', '0',
+                      '-hyco_pod_tol', '1e-18', *more)
+            found_u, found, _ = self.fields('predict', '-model', self.path('m.h5'), '-mu', '0.01')
+            self.assertLess(abs(found - forces).max(), 1e-6 * forces.max(), kind)
+            self.assertLess(abs(found_u - u).max(), 1e-6 * abs(u).max(), kind)
 
     def test_dual_seeds(self):
         """A model whose contacts, of many masters each, are seeds of the reduced domain, with as many points as solutions; on one rank and two."""

@@ -75,6 +75,14 @@ class Fit(Case):
         self.assertGreater(r['evaluations'], one['evaluations'])
         self.assertIn(f"{r['starts_at_least']} of 5 starts", self.run_raw('fit', '-model', 'm.h5', *self.targets, '-fit_starts', '4', '-starts', '5').stdout)
 
+    def test_kinks(self):
+        """Minima of different depth, the deepest at a kink: with more starts the misfit never rises, and the counts are of starts that ended at it."""
+        args = ('fit', '-model', 'm.h5', '-target_peak', '0', '-hold_press', '0.63', '-hold_modulus', '11')
+        found = [self.hyco(*args, '-starts', str(n), status=None) for n in (1, 4, 16)]
+        for few, more in zip(found, found[1:]):
+            self.assertLessEqual(more['misfit_model'], few['misfit_model'] * (1 + 1e-4))
+            self.assertLessEqual(more['starts_at_least'], more['starts'] - 1)  # others end at shallower minima
+
     def test_refused(self):
         """One line that names what is wrong, and no report."""
         for words, args in ((('target_foo', 'lift'), ('-target_foo', '1')), (('-target_', 'lift', 'peak'), ()), (('target_lift', 'number'), ('-target_lift', 'x')),

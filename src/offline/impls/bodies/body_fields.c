@@ -44,7 +44,7 @@ static PetscErrorCode SolveOne(HycoBodiesWork o, const HycoBodiesSurface *s, con
 {
   PetscFunctionBegin;
   PetscCall(HycoFESetParameters(s->fe, mu));
-  PetscCall(HycoRowsFill(s->fe, s->pairs, s->rows));
+  PetscCall(HycoContactRows(s->fe, s->pairs, s->rows));
   PetscCall(HycoBodiesSolve(o, s, mu, Lambda, solved));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -198,7 +198,7 @@ static PetscErrorCode TakePaths(HycoReducer t, HycoSnapshots store, HycoBodiesWo
 
     PetscCall(HycoReducerColumn(t, k, mu));
     PetscCall(HycoFESetParameters(s->fe, mu));
-    PetscCall(HycoRowsFill(s->fe, s->pairs, s->rows));
+    PetscCall(HycoContactRows(s->fe, s->pairs, s->rows));
     /* Forces of the training paths are given: no contact problem, only f = B^T L in the bodies' axes. */
     if (friction)
       PetscCall(HycoBodiesFrictionPrepare(friction, o, mu));
@@ -220,13 +220,12 @@ static PetscErrorCode SampleForces(HycoReducer t, HycoSnapshots store, HycoFOM f
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   struct _n_HycoBodiesWork work = {0};
-  HycoRows rows;
+  HycoRows rows = {0};
   const HycoBodiesSurface s = HycoBodiesSurfaceNormal(f->fe_surface, &f->pairs, &rows);
   HycoBodiesFriction friction = NULL;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoRowsCreate(&f->pairs, b->dim, f->pairs.n, &rows));
   if (HycoSceneHasFriction(t->scene)) PetscCall(HycoBodiesFrictionCreate(t->scene, &s, b->p, &friction));
   ierr = HycoBodiesSetUp(&work, b, t->scene, friction ? HycoBodiesFrictionSurface(friction) : &s, NULL);
   if (!ierr) ierr = SolvePoints(t, &work, &s, friction, points, sampled);

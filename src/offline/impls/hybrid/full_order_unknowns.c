@@ -573,7 +573,6 @@ static PetscErrorCode FillRows(HycoReducer t, HycoROM m, HycoFE fe, HycoPairs *p
   PetscCall(PetscMalloc1((size_t)n * (size_t)t->n_s + 1, &h->S_lambda));
   PetscCall(PetscMalloc1(3 * N, &force));
   PetscCall(PetscCalloc1(fe->n_dof, &u));
-  PetscCall(HycoRowsCreate(pairs, fe->dim, n, &rows));
   for (PetscInt k = 0; k < t->n_s; k++) {
     PetscReal size = 0;
 
@@ -581,8 +580,7 @@ static PetscErrorCode FillRows(HycoReducer t, HycoROM m, HycoFE fe, HycoPairs *p
     if (!(size > 0)) continue;
     PetscCall(HycoReducerColumn(t, k, mu));
     PetscCall(HycoFESetParameters(fe, mu));
-    PetscCall(
-        HycoContactTangentRows(fe, pairs, slip->row, u, slip->tangent, rows.start, rows.dof, rows.value, rows.gap));
+    PetscCall(HycoContactTangentRows(fe, pairs, slip->row, u, slip->tangent, &rows));
     PetscCall(ReadRows(t, slip, k, force, h->S_lambda + (size_t)h->n_dual++ * (size_t)n));
   }
   PetscCall(HycoRowsDestroy(&rows));

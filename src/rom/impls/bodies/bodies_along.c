@@ -47,8 +47,6 @@ static PetscErrorCode Make(HycoBodiesFriction f)
   if (f->along) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&f->along));
   a = f->along;
-  PetscCall(PetscCalloc1(n + 1, &a->rows.start));
-  PetscCall(PetscCalloc1(n + 1, &a->rows.gap));
   PetscCall(PetscMalloc1(6 * f->slip.n + 1, &a->tangent));
   PetscCall(PetscMalloc1(5 * f->slip.n + 1, &a->mu));
   PetscCall(PetscCalloc1(PetscMax(f->normal.fe->n_dof, n), &a->none));
@@ -151,16 +149,9 @@ void HycoBodiesAlongRest(HycoBodiesFriction f, const PetscInt **row, PetscReal w
 static PetscErrorCode TangentRows(HycoROM m, HycoBodiesFriction f)
 {
   HycoBodiesAlong a = f->along;
-  const PetscInt room = HycoPairsWidth(&m->pairs) * f->slip.dim * f->all.n + 1;
 
   PetscFunctionBegin;
-  if (room > a->rows.room) {
-    a->rows.room = room;
-    PetscCall(PetscRealloc((size_t)room * sizeof(*a->rows.dof), &a->rows.dof));
-    PetscCall(PetscRealloc((size_t)room * sizeof(*a->rows.value), &a->rows.value));
-  }
-  PetscCall(HycoContactTangentRows(m->fe, &m->pairs, f->slip.row, a->none, a->tangent, a->rows.start, a->rows.dof,
-                                   a->rows.value, a->rows.gap));
+  PetscCall(HycoContactTangentRows(m->fe, &m->pairs, f->slip.row, a->none, a->tangent, &a->rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

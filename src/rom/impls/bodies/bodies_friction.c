@@ -17,19 +17,13 @@
 #define TURNED  0.02 /* change of a piece of the law up to which the derivative of the forces is kept */
 #define ROUNDED 1e-6 /* of a gap without forces, the least size of those that are left */
 
-/* Room for the rows with tangents. */
-static PetscErrorCode CreateRows(HycoBodiesFriction f)
+/* The surface with tangents, whose rows are those of each step. */
+static PetscErrorCode CreateSurface(HycoBodiesFriction f)
 {
   const HycoPairs *pairs = f->normal.pairs;
-  const PetscInt dim = f->slip.dim, n = f->slip.row[f->slip.n];
+  const PetscInt n = f->slip.row[f->slip.n];
 
   PetscFunctionBegin;
-  /* Rows of a contact have the same masters, so that the width of its normal row bounds each. */
-  f->rows.room = HycoPairsWidth(pairs) * dim * n + 1;
-  PetscCall(PetscCalloc1(n + 1, &f->rows.start));
-  PetscCall(PetscMalloc1(f->rows.room, &f->rows.dof));
-  PetscCall(PetscMalloc1(f->rows.room, &f->rows.value));
-  PetscCall(PetscCalloc1(n + 1, &f->rows.gap));
   PetscCall(PetscMalloc1(n + 1, &f->contact));
   for (PetscInt k = 0; k < pairs->n; k++) {
     /* Every row of a contact has its scene entry: the gap and the normal are found by it. */
@@ -54,7 +48,7 @@ PetscErrorCode HycoBodiesFrictionCreate(HycoScene scene, const HycoBodiesSurface
   f->p = p;
   PetscCall(HycoSlipCreate(PETSC_COMM_SELF, scene, surface->pairs, surface->fe->dim, &f->slip));
   /* Rows of normals and tangents, whose number fixes the sizes below. */
-  PetscCall(CreateRows(f));
+  PetscCall(CreateSurface(f));
   n = p + f->all.n;
   PetscCall(PetscCalloc1(surface->fe->n_dof, &f->U));
   PetscCall(PetscCalloc1(surface->fe->n_dof, &f->U_old));
@@ -150,19 +144,6 @@ static PetscErrorCode Condense(HycoBodiesFriction f, HycoBodiesWork o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Room for mortars, which may meet more masters than before. */
-static PetscErrorCode GrowRows(HycoBodiesFriction f)
-{
-  const PetscInt room = HycoPairsWidth(f->normal.pairs) * f->slip.dim * f->all.n + 1;
-
-  PetscFunctionBegin;
-  if (room <= f->rows.room) PetscFunctionReturn(PETSC_SUCCESS);
-  f->rows.room = room;
-  PetscCall(PetscRealloc((size_t)room * sizeof(*f->rows.dof), &f->rows.dof));
-  PetscCall(PetscRealloc((size_t)room * sizeof(*f->rows.value), &f->rows.value));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Called for each step, as gaps and coefficients of friction change in time. */
 PetscErrorCode HycoBodiesFrictionPrepare(HycoBodiesFriction f, HycoBodiesWork o, const PetscReal mu[])
 {
@@ -170,11 +151,8 @@ PetscErrorCode HycoBodiesFrictionPrepare(HycoBodiesFriction f, HycoBodiesWork o,
 
   PetscFunctionBegin;
   PetscCall(HycoSlipCoefficients(&f->slip, s->fe, s->pairs));
-  PetscCall(HycoPairsMove(s->fe, s->pairs));
-  PetscCall(GrowRows(f));
   /* Tangents' gaps are B_t U_old, so that D - B U is the slip of the step. */
-  PetscCall(HycoContactTangentRows(s->fe, s->pairs, f->slip.row, f->U_old, f->slip.tangent, f->rows.start, f->rows.dof,
-                                   f->rows.value, f->rows.gap));
+  PetscCall(HycoContactTangentRows(s->fe, s->pairs, f->slip.row, f->U_old, f->slip.tangent, &f->rows));
   PetscCall(HycoBodiesPrepare(o, &f->all, mu));
   PetscCall(HycoBlocksDestroy(&f->blocks)); /* of other coefficients */
   PetscCall(HycoBlocksCreate(2, f->slip.cone, f->slip.n, f->slip.of, f->slip.data, &f->blocks));

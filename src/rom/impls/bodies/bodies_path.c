@@ -237,9 +237,8 @@ static PetscErrorCode Record(HycoPath p)
   else if (p->now.total_contact_force > 0 || HycoBodiesLoaded(&w->bodies))
     PetscCall(HycoBodiesLoose(&w->bodies, w->surface.n, m->Lambda, loose));
   m->prediction.loose = (PetscBool)(m->prediction.loose || *loose);
-  PetscCall(HycoRowsCountDependent(w->surface.n, rows->start, rows->dof, rows->value, rows->gap, m->fe->n_dof, m->U,
-                                   m->Lambda, w->friction ? HycoBodiesFrictionSlip(w->friction) : NULL,
-                                   &p->now.n_dependent));
+  PetscCall(HycoRowsCountDependent(rows, m->fe->n_dof, m->U, m->Lambda,
+                                   w->friction ? HycoBodiesFrictionSlip(w->friction) : NULL, &p->now.n_dependent));
   PetscCall(PetscArraycpy(w->motions + p->n_steps * w->bodies.bodies->p, w->bodies.x, w->bodies.bodies->p));
   p->steps[p->n_steps++] = p->now;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));

@@ -36,8 +36,6 @@ PetscErrorCode HycoGalerkinFrictionCreate(HycoROM m)
   PetscCall(HycoSlipCreate(PETSC_COMM_SELF, m->model->scene, &g->own_pairs, dim, &f->own));
   PetscCall(HycoSlipCreate(PETSC_COMM_SELF, m->model->scene, &m->pairs, dim, &f->all));
   m->n_L = f->own.row[m->m];
-  PetscCall(HycoRowsCreate(&g->own_pairs, dim, m->n_L, &g->own_rows));
-  PetscCall(HycoRowsCreate(&m->pairs, dim, f->all.row[m->pairs.n], &f->rows));
   PetscCall(PetscCalloc2(f->all.row[m->pairs.n], &f->force, f->all.row[m->pairs.n], &f->slack));
   PetscCall(PetscCalloc2(m->n_L, &f->last, m->n_L, &f->before));
   PetscCall(PetscCalloc1(m->model->mesh->n_nodes * dim, &f->U_old));
@@ -124,8 +122,7 @@ PetscErrorCode HycoGalerkinFrictionRows(HycoROM m)
 
   PetscFunctionBegin;
   PetscCall(HycoSlipCoefficients(&f->own, m->fe, &g->own_pairs));
-  PetscCall(HycoContactTangentRows(m->fe, &g->own_pairs, f->own.row, f->U_old, f->own.tangent, rows->start, rows->dof,
-                                   rows->value, rows->gap));
+  PetscCall(HycoContactTangentRows(m->fe, &g->own_pairs, f->own.row, f->U_old, f->own.tangent, rows));
   for (PetscInt k = 0; k < m->m; k++) {
     for (PetscInt r = f->own.row[k]; r < f->own.row[k + 1]; r++) {
       const PetscInt end = rows->start[r + 1];
@@ -255,8 +252,7 @@ PetscErrorCode HycoGalerkinFrictionAccept(HycoROM m, HycoPath p)
   PetscCall(HycoROMComplete(m));
   PetscCall(HycoROMBringContacts(m, &fe));
   PetscCall(HycoSlipCoefficients(&f->all, fe, &m->pairs));
-  PetscCall(HycoContactTangentRows(fe, &m->pairs, f->all.row, f->U_old, f->all.tangent, f->rows.start, f->rows.dof,
-                                   f->rows.value, f->rows.gap));
+  PetscCall(HycoContactTangentRows(fe, &m->pairs, f->all.row, f->U_old, f->all.tangent, &f->rows));
   PetscCall(TakeMultipliers(m));
   if (m->ops->reconstruct && m->reconstruct) HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
   PetscCall(ComputeSlips(m, fe, &most));

@@ -83,7 +83,6 @@ PetscErrorCode HycoGalerkinCreateOwn(HycoROM m)
     PetscCall(HycoGalerkinFrictionCreate(m));
     PetscCall(ISCreateStride(PETSC_COMM_SELF, m->n_L, 0, 1, &g->sets.is_rows));
   } else {
-    PetscCall(HycoRowsCreate(&g->own_pairs, m->model->mesh->dim, m->m, &g->own_rows));
     PetscCall(PetscObjectReference((PetscObject)g->sets.is_A_lambda));
     g->sets.is_rows = g->sets.is_A_lambda;
   }
@@ -230,7 +229,7 @@ PetscErrorCode HycoGalerkinOwnRows(HycoROM m)
     PetscCall(HycoGalerkinFrictionRows(m));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(HycoContactRows(m->fe, &g->own_pairs, rows->start, rows->dof, rows->value, rows->gap));
+  PetscCall(HycoContactRows(m->fe, &g->own_pairs, rows));
   if (!g->own_pairs.room) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt k = 0; k < m->m; k++) {
     const PetscInt hi = rows->start[k + 1];
