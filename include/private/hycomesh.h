@@ -87,8 +87,8 @@ struct _n_HycoMesh {
   PetscReal *xyz;          /* n_nodes x 3, as in the file (not moved) */
   PetscInt *node_id;       /* tag in the mesh file */
   PetscInt *node_body;     /* the body that moves it */
-  PetscInt *node_global;   /* number in the distributed vectors; NULL: its own index */
-  PetscInt *node_whole;    /* index in the whole mesh; NULL: its own index */
+  PetscInt *node_global;   /* number in the distributed vectors; NULL (never for want of nodes): its own index */
+  PetscInt *node_whole;    /* index in the whole mesh; NULL as above */
   PetscInt *node_point;    /* point of the DM, in tables made from a DM; else NULL */
   PetscInt n_owned, first; /* with node_global: the numbers of this process's own nodes, first .. first + n_owned - 1 */
   /* of the whole mesh of a part or a surface; 0: of this one */
@@ -100,7 +100,7 @@ struct _n_HycoMesh {
   PetscInt *cells;      /* n_cells x nv, node indices */
   PetscInt *cell_id;    /* tag in the mesh file */
   PetscInt *cell_body;  /* index in scene->body */
-  PetscInt *cell_whole; /* index in the whole mesh; NULL: its own index */
+  PetscInt *cell_whole; /* index in the whole mesh; NULL as node_whole */
   PetscInt *cell_point; /* point of the DM, in tables made from a DM; else NULL */
   /* groups of the file, by name */
   PetscInt n_groups;

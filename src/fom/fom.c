@@ -37,8 +37,7 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Partitions the DM so that few contacts are cut. Each rank has at least a cell; contacts' pairs become heavy edges
-   of the graph. */
+/* Partitions the DM so that few contacts are cut; contacts' pairs become heavy edges of the graph. */
 static PetscErrorCode Distribute(HycoFOM f)
 {
   const HycoPartitioner cut = (HycoPartitioner)f->partition;
@@ -53,8 +52,6 @@ static PetscErrorCode Distribute(HycoFOM f)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(HycoPlexToMesh(f->dm, f->scene, &mesh));
-  PetscCheck(mesh->n_whole_cells >= f->size, HycoComm(f), PETSC_ERR_USER,
-             "the mesh has %d cells; use at most as many ranks", (int)mesh->n_whole_cells);
   /* the file's first bad cell is named; refined cells are checked later */
   if (!f->scene->refine) HycoOnEach(HycoComm(f), HycoMeshCheckCells(mesh));
   if (mesh->n_cells) PetscCall(HycoContactsNeighbours(f->scene, mesh, &n, &pairs));

@@ -39,23 +39,6 @@ static PetscErrorCode Replace(DM *dm, PetscSF sf, DM by)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Refuses a refined mesh of which a rank has no cell: PETSc's overlap of such a mesh reads memory that is not its own
-   (3.18). Collective. */
-static PetscErrorCode CheckParts(DM dm)
-{
-  PetscInt start, end, least, all;
-
-  PetscFunctionBegin;
-  PetscCall(DMPlexGetHeightStratum(dm, 0, &start, &end));
-  /* Both reductions precede the check: all ranks fail together, with the same numbers. */
-  least = all = end - start;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPIU_INT, MPI_MIN, HycoComm(dm)));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &all, 1, MPIU_INT, MPI_SUM, HycoComm(dm)));
-  HycoCheck(least, "scene_refine: %d cells leave one of the %d ranks without any; use fewer ranks", (int)all,
-            (int)HycoSize(HycoComm(dm)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Whole mesh on rank 0 -> a part of each rank, refined, then with one layer of overlap: every cell around an owned
    node is local, so that each rank assembles its rows of K and B without communication. Refinement comes before
    the overlap, which is one layer of refined cells. Replaces *dm. Collective. */
@@ -79,7 +62,6 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
     PetscCall(DMPlexDistribute(*dm, 0, &sf, &next));
     PetscCall(Replace(dm, sf, next));
   }
-  if (scene->refine) PetscCall(CheckParts(*dm));
   PetscCall(HycoPlexRefine(dm, scene, scene->refine));
   HycoCheck(!overlap || !write[0],
             "hyco_mesh_write: the DM has an overlap, and would have cells twice; write it before the overlap is added");

@@ -280,7 +280,7 @@ static PetscErrorCode Number(const Gather *g, HycoMesh sub)
   PetscCall(ISGetLocalSize(points, &n));
   PetscCall(ISGetIndices(points, &point));
   PetscCall(PetscMalloc1(n, &number));
-  PetscCall(PetscMalloc1(sub->n_nodes, &sub->node_global));
+  PetscCall(PetscMalloc1(sub->n_nodes + 1, &sub->node_global));
   for (PetscInt k = 0; k < n; k++) number[k] = g->of[NUMBER][point[k]];
   for (PetscInt i = 0; i < sub->n_nodes; i++) {
     sub->node_global[i] = g->of[GLOBAL][point[sub->node_point[i]]];

@@ -170,10 +170,12 @@ static PetscErrorCode Cut(const Data *d, PetscInt n_parts, PetscInt part[])
   PetscBool done = PETSC_FALSE;
 
   PetscFunctionBegin;
+  /* METIS does not expect fewer cells than parts. */
+  for (PetscInt e = 0; e < d->mesh->n_cells; e++) part[e] = e;
+  if (d->mesh->n_cells <= n_parts) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(CellGraph(d->mesh, d->n_pairs, d->pairs, &graph));
   if (d->by == HYCO_PARTITION_METIS) PetscCall(ByMetis(d->mesh->n_cells, &graph, n_parts, part, &done));
   if (!done) PetscCall(ByScotch(d->mesh->n_cells, &graph, n_parts, part));
-  /* A part without a cell would leave a rank without a mesh. */
   PetscCall(FillParts(d->mesh->n_cells, n_parts, part));
   HycoFreeAll(&graph.xadj, &graph.adjncy, &graph.weight);
   PetscFunctionReturn(PETSC_SUCCESS);

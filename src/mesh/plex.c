@@ -801,9 +801,9 @@ static PetscErrorCode Number(Builder *b)
   /* The local section has dim unknowns at each vertex; the global one numbers them owner by owner. */
   for (PetscInt i = 0; i < m->n_nodes; i++) m->n_owned += b->owned[b->m->node_point[i] - b->v0];
   PetscCallMPI(MPI_Exscan(&m->n_owned, &m->first, 1, MPIU_INT, MPI_SUM, comm));
-  PetscCall(PetscMalloc1(m->n_nodes, &m->node_global));
-  PetscCall(PetscMalloc1(m->n_nodes, &m->node_whole));
-  PetscCall(PetscMalloc1(m->n_cells, &m->cell_whole));
+  PetscCall(PetscMalloc1(m->n_nodes + 1, &m->node_global));
+  PetscCall(PetscMalloc1(m->n_nodes + 1, &m->node_whole));
+  PetscCall(PetscMalloc1(m->n_cells + 1, &m->cell_whole));
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     PetscInt at;
 

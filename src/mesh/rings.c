@@ -225,8 +225,8 @@ static PetscErrorCode PlaceNodes(HycoMesh m, const Rows *r)
   m->n_nodes = r->n;
   PetscCall(PetscMalloc1(r->n, &m->node_id));
   PetscCall(PetscMalloc1(r->n, &m->node_body));
-  PetscCall(PetscMalloc1(r->n, &m->node_global));
-  PetscCall(PetscMalloc1(r->n, &m->node_whole));
+  PetscCall(PetscMalloc1(r->n + 1, &m->node_global));
+  PetscCall(PetscMalloc1(r->n + 1, &m->node_whole));
   PetscCall(PetscMalloc1(3 * r->n, &m->xyz));
   for (PetscInt i = 0; i < r->n; i++) {
     const PetscInt *row = r->row + i * r->width;
@@ -248,7 +248,7 @@ static PetscErrorCode PlaceCells(HycoMesh m, const Rows *r)
   m->n_cells = r->n;
   PetscCall(PetscMalloc1(r->n, &m->cell_id));
   PetscCall(PetscMalloc1(r->n, &m->cell_body));
-  PetscCall(PetscMalloc1(r->n, &m->cell_whole));
+  PetscCall(PetscMalloc1(r->n + 1, &m->cell_whole));
   PetscCall(PetscMalloc1(r->n * m->nv, &m->cells));
   for (PetscInt e = 0; e < r->n; e++) {
     const PetscInt *row = r->row + e * r->width;

@@ -491,8 +491,8 @@ static PetscErrorCode Make(const Cut *c, HycoMesh *sub)
   PetscCall(MakeDM(PETSC_COMM_SELF, c, &dm));
   /* The tables hold the reference that counts; this function's own is released also after an error. */
   HycoFinally(HycoPlexToMesh(dm, c->scene, sub), PetscCall(DMDestroy(&dm)));
-  PetscCall(PetscMalloc1(c->n_nodes, &(*sub)->node_whole));
-  PetscCall(PetscMalloc1(c->n_cells, &(*sub)->cell_whole));
+  PetscCall(PetscMalloc1(c->n_nodes + 1, &(*sub)->node_whole));
+  PetscCall(PetscMalloc1(c->n_cells + 1, &(*sub)->cell_whole));
   for (PetscInt i = 0; i < c->n_nodes; i++)
     (*sub)->node_whole[i] = m->node_whole ? m->node_whole[c->node[i]] : c->node[i];
   for (PetscInt e = 0; e < c->n_cells; e++)

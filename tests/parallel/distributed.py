@@ -30,11 +30,11 @@ def datasets(path):
 
 
 class Distributed(Case):
-    def same(self, scene, mu, *more, tolerance=1e-9):
+    def same(self, scene, mu, *more, tolerance=1e-9, numbers=RANKS):
         """Report and fields on several ranks are those of one."""
         one = self.hyco('solve', '-scene', scene, '-mu', mu, '-output', 'one.xdmf', *more)
         right = datasets(self.path('one.h5'))
-        for ranks in RANKS:
+        for ranks in numbers:
             with self.subTest(scene=scene, ranks=ranks):
                 r = self.hyco('solve', '-scene', scene, '-mu', mu, '-output', 'many.xdmf', *more, ranks=ranks)
                 self.solved(r)
@@ -79,6 +79,37 @@ class Distributed(Case):
     def test_refined(self):
         """Contacts are found after the distribution."""
         self.same(self.stack(), 1, '-scene_refine', 1)
+
+    def test_without_nodes(self):
+        """A rank that owns no node, here of two: all nodes of its pyramids and tetrahedra are the other's. Fields in both formats."""
+        nodes = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1), (2, 1, 0), (2, 0, 0), (1.5, 0.5, 0.5), (2, 0, 1),
+                 (2, 1, 1)]
+        pyramids = ((2, 10, 9, 3, 11), (2, 3, 7, 6, 11), (10, 12, 13, 9, 11), (9, 13, 7, 3, 11))
+        tetrahedra = ((2, 12, 10, 11), (2, 6, 12, 11), (6, 13, 12, 11), (6, 7, 13, 11))
+        elements = [(5, 1, (1, 2, 3, 4, 5, 6, 7, 8)), *((7, 1, c) for c in pyramids), *((4, 1, c) for c in tetrahedra), (3, 2, (1, 2, 6, 5)),
+                    (2, 2, (2, 10, 12)), (2, 2, (2, 12, 6))]
+        msh(self.path('few.msh'), nodes, elements, {1: (3, 'b'), 2: (2, 'base')})
+        scene = self.written('scene: {mesh: few.msh, parameters: [q]}\nparameter: {q: {range: [0, 2]}}\nbody: {b: {young: 1000, poisson: 0.3}}\n'
+                             'fixed: {base: {x: 0, y: 0, z: 0}}\nforce: {b: {y: q}}')
+        self.same(scene, 1, numbers=(2,))
+        self.hyco('solve', '-scene', scene, '-mu', 1, '-output', 'few.vtkhdf', ranks=2)
+
+    def test_without_cells(self):
+        """Two cells in contact on four ranks, two of which have none: the fields of the refined scene; a training, its prediction."""
+        corners = lambda y: [(0, y, 0), (1, y, 0), (1, y + 1, 0), (0, y + 1, 0)]
+        msh(self.path('two.msh'), corners(0) + corners(1), [(3, 1, (1, 2, 3, 4)), (3, 2, (5, 6, 7, 8)), (1, 3, (1, 2)), (1, 4, (3, 4)), (1, 5, (5, 6)),
+                                                            (1, 6, (7, 8))],
+            {1: (2, 'a'), 2: (2, 'b'), 3: (1, 'foot'), 4: (1, 'seat'), 5: (1, 'sole'), 6: (1, 'head')})
+        scene = self.written('scene: {mesh: two.msh, parameters: [E, q]}\nparameter: {E: {range: [1, 3]}, q: {range: [0, 0.1]}}\nbody: {a: {young: E}, b: '
+                             '{young: 2, poisson: 0.3}}\nfixed: {foot: {x: 0, y: 0}, head: {x: 0, y: -q}}\ncontact: {c: {type: mortar, slave: sole, '
+                             'master: seat}}\noutput: {peak: {max: mises}}')
+        self.same(scene, '2,0.1', '-scene_refine', 1, numbers=(4,))
+        found = []
+        for ranks in (0, 4):
+            self.hyco('train', '-scene', scene, '-grid', '3,2', '-model', f'{ranks}.h5', '-hyco_model_type', 'hybrid', '-hyco_rid_layers', 1, ranks=ranks)
+            found.append(self.hyco('predict', '-model', f'{ranks}.h5', '-mu', '2,0.1', ranks=ranks))
+        self.near(found[1]['total_contact_force'], found[0]['total_contact_force'], 1e-9)
+        self.near(found[1]['outputs']['peak'], found[0]['outputs']['peak'], 1e-9)
 
     def test_search(self):
         """Each rank searches for the masters of the slaves that it owns, as drawn and once more where a map has them, on a part of the master; the

@@ -919,25 +919,6 @@ static PetscErrorCode TestRefused(const Patch *p, const char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A refined mesh with fewer cells than ranks, to which PETSc cannot add the overlap, is refused in one line. */
-static PetscErrorCode TestEmptyPart(const Patch *p)
-{
-  HycoScene scene;
-  HycoMesh whole;
-  DM dm;
-
-  PetscFunctionBegin;
-  PetscCall(MakeScene(PETSC_COMM_WORLD, p, "1", &scene));
-  PetscCall(HycoMeshLoad(PETSC_COMM_WORLD, scene, &dm));
-  PetscCall(HycoPlexToMesh(dm, scene, &whole));
-  CHECK_FAILS(HycoMeshDistribute(&dm, scene, whole, 0, NULL, HYCO_PARTITION_METIS, ""),
-              "ranks without any; use fewer ranks");
-  PetscCall(HycoMeshDestroy(&whole));
-  PetscCall(DMDestroy(&dm));
-  PetscCall(DropScene(&scene));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* With straight edges, the nodes added to hex20 cells and quad8 facets are the middles of faces and cells: hex27's. */
 static PetscErrorCode TestFaceNodes(void)
 {
@@ -968,31 +949,25 @@ static PetscErrorCode TestFaceNodes(void)
 
 static PetscErrorCode Test(void)
 {
-  PetscInt refined = 0;
-
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   MakeCases();
   for (int t = 0; t < N_CASES; t++) {
     const Patch *p = &cases[t];
-    const PetscBool enough = (PetscBool)(p->n_cells >= size); /* the full order refuses fewer */
     const PetscBool quadratic = (PetscBool)(t < HYCO_N_MESH_TYPES && HycoCellKinds[t].quadratic);
 
     if (!p->name) continue;
     PetscCall(TestDM(p));
     if (!rank) PetscCall(TestSubmesh(p, PETSC_FALSE));
     if (!rank) PetscCall(TestSubmesh(p, PETSC_TRUE));
-    if (enough) PetscCall(TestDistribution(p));
+    PetscCall(TestDistribution(p)); /* also with fewer cells than ranks, some of which then have none */
     if (quadratic || t == MIXED)
       PetscCall(TestRefused(p, quadratic ? p->name : "pyramid"));
-    else if (enough && ++refined)
-      PetscCall(TestRefinement(p, t == HYCO_TRI3 || t == HYCO_HEX8 ? 2 : 1));
     else
-      PetscCall(TestEmptyPart(p));
+      PetscCall(TestRefinement(p, t == HYCO_TRI3 || t == HYCO_HEX8 ? 2 : 1));
   }
   if (!rank) PetscCall(TestFaceNodes());
-  CHECK(refined > 0, "no case has as many cells as there are %d ranks", size);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
