@@ -101,7 +101,7 @@ class Greedy(Ring):
         stored = {n: os.stat(os.path.join(folder, n)).st_mtime_ns for n in os.listdir(folder) if re.fullmatch(r'[0-9a-f]{16}\.h5', n)}
         self.assertGreaterEqual(len(stored), 4)
         self.hyco(*command, status=3)
-        self.assertEqual(self.rows('killed.h5'), self.rows('one.h5'))
+        self.alike(self.rows('killed.h5'), self.rows('one.h5'))
         for name, when in stored.items():
             self.assertEqual(os.stat(os.path.join(folder, name)).st_mtime_ns, when, 'solved again')
         self.assertFalse([n for n in os.listdir(folder) if n.startswith('greedy') and n.endswith('.h5')])

@@ -28,6 +28,20 @@ def said(run):
     return [line for line in run.stderr.splitlines() if line.startswith('hyco: ') or 'PETSC ERROR' in line]
 
 
+def alike(a, b, relative=1e-6, floor=1e-12):
+    """Whether two runs have the same result: equal but for round-off. Numbers, also in texts, differ by less than `relative` of their size, or by
+    `floor`: residuals and errors that are round-off themselves have no digit in common. Lists and dictionaries by entry."""
+    if isinstance(a, dict):
+        return isinstance(b, dict) and a.keys() == b.keys() and all(alike(a[k], b[k], relative, floor) for k in a)
+    if isinstance(a, (list, tuple)):
+        return isinstance(b, (list, tuple)) and len(a) == len(b) and all(alike(x, y, relative, floor) for x, y in zip(a, b))
+    try:
+        x, y = float(a), float(b)
+    except (TypeError, ValueError):
+        return a == b
+    return x == y or (x != x and y != y) or abs(x - y) <= relative * max(abs(x), abs(y)) + floor
+
+
 def settled(args):
     """The arguments; for a training without search and without held-out solutions: the settings are the test's, those of the paper for its
     scenes, or the defaults."""
@@ -118,6 +132,9 @@ class Case(unittest.TestCase):
 
     def near(self, found, expected, relative, what=''):
         self.assertLessEqual(abs(found - expected), relative * abs(expected), f'{what}: {found!r} for {expected!r}')
+
+    def alike(self, found, expected, what=''):
+        self.assertTrue(alike(found, expected), f'{what}: {found} for {expected}')
 
     def solved(self, report, tolerance=1e-8, energy=1e-8):
         """Checks the Karush-Kuhn-Tucker residuals that the run recomputed; for full order also the energy identity."""
