@@ -109,11 +109,15 @@ static PetscReal Stress(const Export *e, const Row *r, PetscInt n, const PetscRe
 /* The areas of the contacts at the model's parameters. */
 static PetscErrorCode FindAreas(Export *e)
 {
+  PetscReal *normal, *gap;
   HycoFE fe;
 
   PetscFunctionBegin;
   PetscCall(HycoROMBringContacts(e->m, &fe));
-  PetscCall(HycoContactAreas(fe, &e->m->pairs, e->area));
+  PetscCall(PetscMalloc2(3 * e->m->pairs.n, &normal, e->m->pairs.n, &gap));
+  PetscCall(HycoContactGeometry(fe, &e->m->pairs, normal, gap));
+  PetscCall(HycoContactAreas(fe, &e->m->pairs, normal, e->area));
+  PetscCall(PetscFree2(normal, gap));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -133,13 +133,17 @@ static PetscErrorCode FindNodes(HycoTravel t, HycoExportModel *out, PetscInt num
       for (PetscInt a = 0; a < m->nf && m->facet_group[f] == g; a++) number[m->facets[f * m->nf + a]] = 0;
     }
   }
-  PetscCall(PetscMalloc1(m->n_nodes, &t->node));
+  PetscCall(PetscMalloc1(m->n_nodes + t->m->pairs.n, &t->node));
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     if (number[i] < 0) continue;
     HycoCheck(HycoMeshTied(m, i) < 0, "export: contacts that travel on tied nodes, as node %d, cannot be exported",
               (int)m->node_id[i]);
     t->node[u->n_nodes] = i;
     number[i] = u->n_nodes++; /* ascending, as in the mesh */
+  }
+  /* A slave on an edge is a node of each of its sides. */
+  for (PetscInt k = 0; k < t->m->pairs.n; k++) {
+    if (t->m->pairs.side[k] != HYCO_ONE_SIDE) t->node[u->n_nodes++] = t->m->pairs.slave[k];
   }
   PetscCall(PetscMalloc1(u->n_nodes, &u->body));
   PetscCall(PetscMalloc1(3 * u->n_nodes, &u->drawn));
@@ -215,6 +219,32 @@ static PetscErrorCode TakeElement(const HycoFE fe, Surfaces *u)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The slaves' nodes: of those on edges the ones that FindNodes() has added, which their sides' facets get as well. */
+static PetscErrorCode PlaceSlaves(HycoTravel t, const PetscInt number[], Surfaces *u)
+{
+  const HycoPairs *pairs = &t->m->pairs;
+  const HycoMesh m = t->m->fe->mesh;
+  PetscInt next = u->n_nodes;
+
+  PetscFunctionBegin;
+  for (PetscInt k = pairs->n - 1; k >= 0; k--) {
+    PetscInt g = 0, *at = u->facet + u->surface[2 * pairs->contact[k]].first * u->nf;
+
+    u->search[pairs->contact[k]].first = k;
+    u->search[pairs->contact[k]].n++;
+    u->slave[k] = number[pairs->slave[k]];
+    if (pairs->side[k] == HYCO_ONE_SIDE) continue;
+    u->slave[k] = --next;
+    PetscCall(HycoMeshFindGroup(m, "contact", t->m->model->scene->contact[pairs->contact[k]]->slave, &g));
+    for (PetscInt f = 0; f < m->n_facets * m->nf; f++) {
+      if (m->facet_group[f / m->nf] != g) continue;
+      if (m->facets[f] == pairs->slave[k] && m->facet_side[f] == pairs->side[k]) *at = u->slave[k];
+      at++;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Slave and master of each contact of the scene, and its slave nodes. */
 static PetscErrorCode FindSurfaces(HycoTravel t, const PetscInt number[], HycoExportModel *out)
 {
@@ -234,14 +264,10 @@ static PetscErrorCode FindSurfaces(HycoTravel t, const PetscInt number[], HycoEx
     PetscCall(HycoMeshFindGroup(t->m->fe->mesh, "contact", s->contact[c]->slave, &g[0]));
     PetscCall(HycoMeshFindGroup(t->m->fe->mesh, "contact", s->contact[c]->master, &g[1]));
     for (PetscInt k = 0; k < 2; k++) PetscCall(AddSurface(t, g[k], number, out));
-    u->search[c] = (Facing){.slave = 2 * c, .master = 2 * c + 1};
+    u->search[c] = (Facing){.slave = 2 * c, .master = 2 * c + 1, .edges = pairs->search[c].edges};
     u->reach[c] = pairs->search[c].reach;
   }
-  for (PetscInt k = pairs->n - 1; k >= 0; k--) {
-    u->search[pairs->contact[k]].first = k;
-    u->search[pairs->contact[k]].n++;
-    u->slave[k] = number[pairs->slave[k]];
-  }
+  PetscCall(PlaceSlaves(t, number, u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

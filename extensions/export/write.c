@@ -172,7 +172,7 @@ static int List(HycoExportModel *e, HycoScene s, Array list[MOST_ARRAYS])
       {"double", "surfaces.N", points, 0, OWN(f->N)},
       {"double", "surfaces.dN", 2 * points, 0, OWN(f->dN)},
       {"Surface", "surfaces.surface", (size_t)e->n_surfaces, 6, OWN(f->surface)},
-      {"Facing", "surfaces.search", (size_t)f->n_searches, 4, OWN(f->search)},
+      {"Facing", "surfaces.search", (size_t)f->n_searches, 5, OWN(f->search)},
       {"double", "surfaces.reach", (size_t)f->n_searches, 0, OWN(f->reach)},
       {"PetscInt", "surfaces.facet", (size_t)(e->n_facets * f->nf), 0, OWN(f->facet)},
       {"PetscInt", "surfaces.border", 2 * (size_t)e->n_border, 0, OWN(f->border)},

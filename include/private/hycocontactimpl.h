@@ -53,13 +53,16 @@ PetscErrorCode HycoTiesFind(HycoScene scene, HycoMesh mesh, HycoTies *ties);
 typedef struct {
   PetscBool moved; /* a map may move the surfaces of this contact */
   PetscReal reach; /* largest distance of a master point from its slave on moved surfaces; PETSC_MAX_REAL: any */
+  PetscInt edges;  /* as in HycoSurfaceFacts */
 } HycoSearch;
 
 /* What a rank's part of a contact's surfaces does not show of the whole ones. */
 typedef struct {
   PetscBool moved; /* a map may move them */
   PetscReal small; /* a tenth of the shortest edge of the slave's facets; 0: it has none */
+  PetscInt edges;  /* bits: the slave, the master goes round an edge */
 } HycoSurfaceFacts;
+enum { HYCO_SLAVE_EDGE = 1, HYCO_MASTER_EDGE = 2 };
 
 /* Friction in a solution, by contact: 3 components in the scene's axes. */
 typedef struct {
@@ -74,6 +77,8 @@ typedef struct _n_HycoPairs {
   PetscInt n;
   PetscInt *slave;   /* node indices */
   PetscInt *contact; /* index in scene->contact */
+  PetscInt *side;    /* of a slave on an edge: the side of the surface whose normal and area are the contact's, else
+                        HYCO_ONE_SIDE, as where the scene gives the normal */
   PetscInt *master_start, *master;
   PetscReal *weight;
   PetscInt
@@ -164,8 +169,8 @@ void HycoPairsJump(const HycoPairs *pairs, PetscInt k, PetscInt dim, const Petsc
 /* Allocates n more contacts of `width` masters; adds one contact, or masters to the last one. Contacts are added in the
    order of the scene's. */
 PetscErrorCode HycoPairsReserve(HycoPairs *pairs, PetscInt n, PetscInt width);
-void HycoPairsAppend(HycoPairs *pairs, PetscInt contact, PetscInt slave, PetscInt n, const PetscInt node[],
-                     const PetscReal weight[]);
+void HycoPairsAppend(HycoPairs *pairs, PetscInt contact, PetscInt slave, PetscInt side, PetscInt n,
+                     const PetscInt node[], const PetscReal weight[]);
 void HycoPairsAddMasters(HycoPairs *pairs, PetscInt n, const PetscInt node[], const PetscReal weight[]);
 /* The contacts which[0..n) with node i renumbered as index[i] (NULL: unchanged), and their search and numbers. The
    caller destroys it. */
@@ -234,8 +239,12 @@ PetscErrorCode HycoFEFindUnconstrained(MPI_Comm comm, HycoFE fe, HycoFE wide, co
                                        PetscInt *n_alike, PetscReal **alike);
 /* The longest edge around each node (n_nodes) of the facets of `group`; 0 where it has none. */
 void HycoSurfaceSizes(HycoFE fe, PetscInt group, PetscReal size[]);
-/* Tributary area (length in 2D, 1 in 1D) of each contact's slave node; 0 if its group is no surface. */
-PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[]);
+/* Tributary area (length in 2D, 1 in 1D) of each contact's slave node; 0 if its group is no surface. On an edge it is that of
+   the contact's side, or, where the scene gives the normals (n x 3), of the sides that these leave. */
+PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], PetscReal area[]);
+/* Fails, on all processes, if a normal that the scene gives points into the slave's body or along its surface: at a slave
+   that faces a master, or, without masters, at all. normal: of the pairs. Collective. */
+PetscErrorCode HycoContactCheckNormals(MPI_Comm comm, HycoFE fe, const HycoPairs *pairs, const PetscReal normal[]);
 /* The pressures of a process's contacts: forces over areas. A node without area, on the axis of an axisymmetric scene with
    cells of second order, has the mean pressure of itself and the middle of its facet. Collective. */
 PetscErrorCode HycoContactPressures(MPI_Comm comm, HycoFE fe, const HycoPairs *pairs, const PetscReal area[],

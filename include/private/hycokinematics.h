@@ -75,6 +75,8 @@ PetscErrorCode HycoFESetTangents(HycoFE fe, PetscBool all, PetscBool moved, cons
 PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3]);
 /* The same without the factor 2 pi r of an axisymmetric scene, which is 0 on the axis. */
 PetscErrorCode HycoFacetDirection(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3]);
+/* In an axisymmetric scene: whether the mesh file has the node on the axis. */
+PetscBool HycoNodeIsOnAxis(HycoFE fe, PetscInt node);
 /* Whether a node has no share in the areas of its facets: on cells of second order, a node on the axis of an
    axisymmetric scene, where the integral of its function times r over a facet is 0. */
 PetscBool HycoNodeHasNoArea(HycoFE fe, PetscInt node);
@@ -88,8 +90,9 @@ PetscErrorCode HycoMirrorFind(HycoFE fe);
 PetscErrorCode HycoContactCheckStill(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal gap, PetscReal *left);
 /* Unit normals (n_nodes x 3; zero off the group) of the smooth surface that a group's facets approximate, on fe's
    moved nodes, the angle of uncertainty due to faceting, and the largest angle between facets nearby (n_nodes both).
-   2D, 3D. */
-PetscErrorCode HycoSmoothNormals(HycoFE fe, PetscInt group, PetscReal normal[], PetscReal doubt[], PetscReal bend[]);
+   side: of nodes on edges the side whose facets count, else HYCO_ONE_SIDE (n_nodes). 2D, 3D. */
+PetscErrorCode HycoSmoothNormals(HycoFE fe, PetscInt group, const PetscInt side[], PetscReal normal[],
+                                 PetscReal doubt[], PetscReal bend[]);
 /* Turns the normal of contact k so that the motions of fe->released are tangential there. */
 void HycoTurnNormal(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal n[3]);
 

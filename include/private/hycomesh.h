@@ -43,6 +43,10 @@ extern const HycoCellKind HycoCellKinds[HYCO_N_CELL_TYPES];
 
 typedef struct _n_HycoMesh *HycoMesh;
 
+/* The sides 0, 1, ... of a node on an edge of more than 40 degrees, at most one for each direction; of other nodes; of
+   facets on the axis of revolution, which are no surface. */
+enum { HYCO_NO_SIDE = -2, HYCO_ONE_SIDE = -1, HYCO_SIDES = 3 };
+
 /*
   Shapes (shapes.c): a mesh of several types of first order, or of prisms or pyramids, has the type quad4 or hex8. Its
   smaller cells are collapsed: a node at several places of the cell, next to each other. The map of the wider type then
@@ -112,6 +116,9 @@ struct _n_HycoMesh {
   PetscInt *facets;      /* n_facets x nf */
   PetscInt *facet_group; /* index of the group; a facet in two groups occurs twice */
   PetscInt *facet_cell;  /* the cell that it bounds; -1: not in this mesh */
+  PetscInt
+      *facet_side; /* n_facets x nf: the side of its group's edge at the node, as drawn, HYCO_ONE_SIDE or HYCO_NO_SIDE;
+                            NULL until HycoSurfaceSides() */
   PetscInt *facet_point; /* of a submesh: the point of the DM that is a facet without its cell, else -1; or NULL */
   /* cell groups that are no body (regions): cells of group g as CSR over groups */
   PetscInt *group_cell_start, *group_cell;

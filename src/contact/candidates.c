@@ -5,6 +5,7 @@
   the least of these distances cannot have it. Each rank tests the facets around its own nodes against all ranks' boxes,
   and sends the numbers of these nodes.
 */
+#include "facing.h"
 #include "master_search.h"
 #include <hycovector.h>
 
@@ -305,6 +306,7 @@ PetscErrorCode HycoContactsCandidates(MPI_Comm comm, HycoFE fe, PetscReal slack,
   PetscCall(PetscCalloc1(fe->mesh->n_nodes, &s.sent));
   for (PetscInt k = 0; k < scene->n_contacts; k++) {
     HycoContact c = scene->contact[k];
+    PetscInt edges;
 
     if (!c->master) continue;
     PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &s.slave));
@@ -313,9 +315,12 @@ PetscErrorCode HycoContactsCandidates(MPI_Comm comm, HycoFE fe, PetscReal slack,
     PetscCall(PetscArrayzero(s.sent, fe->mesh->n_nodes));
     PetscCall(FindBoxes(&s));
     PetscCall(FindMargin(&s, c->integrated, slack));
+    /* Where surfaces go round edges, a slave may face a part of the master that is not the nearest. */
+    PetscCall(HycoContactEdges(scene, fe->mesh, c, &edges));
+    HycoAllreduce(&edges, 1, MPIU_INT, MPI_MAX, comm);
     PetscCall(FindReach(&s));
-    /* The one node of a rigid body is the master everywhere. */
-    PetscCall(c->rigid ? AddAll(&s) : AddNear(&s));
+    /* The one node of a rigid body is the master everywhere, too. */
+    PetscCall(c->rigid || edges ? AddAll(&s) : AddNear(&s));
   }
   /* One exchange for all contacts. */
   PetscCall(HycoSendRows(comm, s.n, s.to, sizeof(PetscInt), s.node, n, node));

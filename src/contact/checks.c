@@ -5,6 +5,10 @@
 /* Share of a slave's facet: largest overlap of surfaces before any load. */
 #define HYCO_OVERLAP_SHARE 0.5
 
+/* The cosine of 84 degrees: a given normal at a larger angle to its surface's outward one is along the surface, or into the
+   body. Surfaces that face each other are within 72 degrees. */
+#define ALONG 0.1
+
 /* The size of facets around a node, of one surface at a time: the slave's or the master's of a contact of the scene. */
 typedef struct {
   const char *group;
@@ -100,6 +104,64 @@ PetscErrorCode HycoContactCheck(HycoFE fe, const HycoPairs *pairs, const PetscRe
   }
   /* After verify(): normals that do not face each other may be the cause. */
   if (deepest >= 0) PetscCall(RefuseOverlap(fe, pairs, deepest, worst, allowed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The least cosine between a given normal and the outward normal at a slave that faces a master, and the largest at any
+   slave; 2: there is none. */
+static PetscErrorCode FindCosines(HycoFE fe, const HycoPairs *p, PetscInt first, PetscInt last,
+                                  const PetscReal normal[], PetscReal *least, PetscReal *most)
+{
+  const HycoContact c = fe->scene->contact[p->contact[first]];
+  PetscReal *cosine;
+  PetscInt g = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &g));
+  PetscCall(PetscMalloc1(last - first, &cosine));
+  PetscCall(HycoSidesFacing(fe, g, last - first, p->slave + first, normal + 3 * first, cosine, NULL));
+  for (PetscInt k = first; k < last; k++) {
+    *most = PetscMax(*most, cosine[k - first]);
+    if (c->master && !c->rigid && !HycoPairsAlone(fe->scene, p, k)) *least = PetscMin(*least, cosine[k - first]);
+  }
+  PetscCall(PetscFree(cosine));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* On all ranks alike: a rank may have only those slaves of an obstacle that look away from it. */
+PetscErrorCode HycoContactCheckNormals(MPI_Comm comm, HycoFE fe, const HycoPairs *pairs, const PetscReal normal[])
+{
+  const HycoScene s = fe->scene;
+  PetscReal *worst; /* by contact: the least cosine, minus the largest one */
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(2 * s->n_contacts, &worst));
+  for (PetscInt c = 0; c < s->n_contacts; c++) {
+    worst[2 * c] = 2;
+    worst[2 * c + 1] = 2; /* minus -2: no slave */
+  }
+  for (PetscInt k = 0, next; k < pairs->n; k = next) {
+    const PetscInt c = pairs->contact[k];
+    PetscReal most = -2;
+
+    next = HycoPairsRun(pairs, k);
+    if (HycoContactAverages(s->contact[c])) continue;
+    PetscCall(FindCosines(fe, pairs, k, next, normal, &worst[2 * c], &most));
+    worst[2 * c + 1] = -most;
+  }
+  HycoAllreduce(worst, 2 * s->n_contacts, MPIU_REAL, MPI_MIN, comm);
+  for (PetscInt c = 0; c < s->n_contacts; c++) {
+    const PetscReal cosine = PetscMin(worst[2 * c], -worst[2 * c + 1]);
+    const PetscBool into = (PetscBool)(cosine < -ALONG);
+
+    if (cosine >= ALONG || worst[2 * c + 1] == 2) continue;
+    PetscCall(PetscFree(worst));
+    HycoFail("contact %s: its normal points %s %s; give one that points out of the slave's body, or none, and the "
+             "surface's own is taken",
+             s->contact[c]->name, into ? "into the body of its slave" : "along the surface of its slave",
+             s->contact[c]->slave);
+  }
+  PetscCall(PetscFree(worst));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -19,6 +19,13 @@ void HycoSurfaceCarriers(HycoMesh m, PetscInt group, PetscBool carries[])
 {
   for (PetscInt i = 0; i < m->n_nodes; i++) carries[i] = PETSC_FALSE;
   for (PetscInt k = m->group_start[group]; k < m->group_start[group + 1]; k++) carries[m->group_node[k]] = PETSC_TRUE;
+  /* Not those all of whose facets lie on the axis of revolution. */
+  for (PetscInt k = 0; m->facet_side && k < 2 * m->n_facets * m->nf; k++) {
+    const PetscInt at = k % (m->n_facets * m->nf), other = k / (m->n_facets * m->nf);
+
+    if (m->facet_group[at / m->nf] == group && (m->facet_side[at] != HYCO_NO_SIDE) == other)
+      carries[m->facets[at]] = (PetscBool)other;
+  }
   for (PetscInt f = 0; f < m->n_facets; f++) {
     /* A corner of a six-node triangle has a zero integral, one of an eight-node quadrilateral a negative one: a
        pressure would give it no force, or one in the wrong direction. */
@@ -83,7 +90,7 @@ static void PassTied(HycoMesh m, PetscInt width, PetscReal v[])
 
 /* Adds n dS at a point of a facet to its node a, by the node's function N. Where a node has no area, on the axis, the
    sum would be round-off: it is then weighted by N^2, and along the axis, by symmetry. */
-static void AddVector(HycoFE fe, PetscInt node, PetscReal N, const PetscReal n[3], PetscReal vector[3])
+void HycoAddFacetVector(HycoFE fe, PetscInt node, PetscReal N, const PetscReal n[3], PetscReal vector[3])
 {
   const PetscBool none = HycoNodeHasNoArea(fe, node);
 
@@ -108,7 +115,7 @@ PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
       for (PetscInt a = 0; a < m->nf; a++) {
         const PetscInt node = m->facets[f * m->nf + a];
 
-        AddVector(fe, node, el->N[q][a], n, vector + 3 * node);
+        HycoAddFacetVector(fe, node, el->N[q][a], n, vector + 3 * node);
       }
     }
   }
@@ -145,23 +152,24 @@ static PetscErrorCode Shares(HycoFE fe, PetscInt group, PetscReal share[])
 
 /* Areas of the contacts' slaves (m^2), by which forces become pressures. Not collective. Negative shares, of corners of
    second-order facets, belong to nodes that carry no contact. */
-PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[])
+PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], PetscReal area[])
 {
   PetscReal *share;
-  PetscInt last = -1;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(fe->mesh->n_nodes, &share));
-  for (PetscInt k = 0; k < pairs->n; k++) {
-    /* The contacts of one scene entry are contiguous: the shares of a surface are integrated once. */
-    if (last != pairs->contact[k]) {
-      PetscInt g = 0;
+  /* The contacts of one scene entry are contiguous: the shares of a surface are integrated once. */
+  for (PetscInt k = 0, next; k < pairs->n; k = next) {
+    const HycoContact c = fe->scene->contact[pairs->contact[k]];
+    PetscInt g = 0;
 
-      last = pairs->contact[k];
-      PetscCall(HycoMeshFindGroup(fe->mesh, "contact", fe->scene->contact[last]->slave, &g));
-      PetscCall(Shares(fe, g, share));
-    }
-    area[k] = share[pairs->slave[k]];
+    next = HycoPairsRun(pairs, k);
+    PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &g));
+    PetscCall(Shares(fe, g, share));
+    for (PetscInt i = k; i < next; i++) area[i] = share[pairs->slave[i]];
+    PetscCall(HycoSideSums(fe, g, next - k, pairs->slave + k, pairs->side + k, NULL, area + k));
+    if (!HycoContactAverages(c))
+      PetscCall(HycoSidesFacing(fe, g, next - k, pairs->slave + k, normal + 3 * k, NULL, area + k));
   }
   PetscCall(PetscFree(share));
   PetscFunctionReturn(PETSC_SUCCESS);

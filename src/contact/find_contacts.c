@@ -34,22 +34,27 @@ static PetscErrorCode IsSurfaceMoved(HycoScene scene, HycoMesh m, HycoContact c,
    search alike. Collective. Ranks without a facet of the surface have nothing to say about its tolerance. */
 PetscErrorCode HycoContactsFacts(MPI_Comm comm, HycoScene scene, HycoMesh part, HycoSurfaceFacts facts[])
 {
+
   PetscFunctionBegin;
   for (PetscInt k = 0; k < scene->n_contacts; k++) {
     HycoContact c = scene->contact[k];
     /* One reduction with MPI_MIN for both. */
-    PetscReal least[2] = {PETSC_MAX_REAL, 0}; /* the tolerance, minus whether it is moved */
+    PetscReal least[4] = {PETSC_MAX_REAL, 0, 0, 0}; /* the tolerance, minus whether it is moved, minus its edges */
     PetscBool moved = PETSC_FALSE;
-    PetscInt g = 0;
+    PetscInt g = 0, edges;
 
     PetscCall(HycoMeshFindGroup(part, "contact", c->slave, &g));
     least[0] = HycoSurfaceTolerance(part, g);
     if (least[0] == 0) least[0] = PETSC_MAX_REAL; /* no facets here */
     if (c->ops->find) PetscCall(IsSurfaceMoved(scene, part, c, &moved));
     least[1] = moved ? -1 : 0;
-    HycoAllreduce(least, 2, MPIU_REAL, MPI_MIN, comm);
+    PetscCall(HycoContactEdges(scene, part, c, &edges));
+    least[2] = -(edges & HYCO_SLAVE_EDGE);
+    least[3] = -(edges & HYCO_MASTER_EDGE);
+    HycoAllreduce(least, 4, MPIU_REAL, MPI_MIN, comm);
     facts[k].small = least[0] < PETSC_MAX_REAL ? least[0] : 0;
     facts[k].moved = (PetscBool)(least[1] < 0);
+    facts[k].edges = -(PetscInt)(least[2] + least[3]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -57,6 +62,7 @@ PetscErrorCode HycoContactsFacts(MPI_Comm comm, HycoScene scene, HycoMesh part, 
 /* Marks contacts whose masters are searched again after each motion, and sets the room for their masters. */
 PetscErrorCode HycoPairsSetSearch(HycoScene scene, HycoMesh m, HycoPairs *pairs)
 {
+
   PetscFunctionBegin;
   pairs->room = 0;
   pairs->n_searches = scene->n_contacts;
@@ -67,6 +73,10 @@ PetscErrorCode HycoPairsSetSearch(HycoScene scene, HycoMesh m, HycoPairs *pairs)
     HycoSearch *search = &pairs->search[k];
 
     search->reach = PETSC_MAX_REAL;
+    if (pairs->facts)
+      search->edges = pairs->facts[k].edges;
+    else
+      PetscCall(HycoContactEdges(scene, m, c, &search->edges));
     if (!c->ops->find) continue;
     if (pairs->facts)
       search->moved = pairs->facts[k].moved;
@@ -99,13 +109,13 @@ static PetscErrorCode FindRun(HycoFE fe, HycoPairs *p, PetscInt k, PetscInt next
   /* The whole run is passed at once, so that the type builds one tree for all of its slaves. */
   if (HycoPairsMoved(p, k)) {
     p->queries += next - k;
-    PetscCall((*c->ops->find)(c, fe, index, p->search[index].reach, next - k, p->slave + k, found));
+    PetscCall((*c->ops->find)(c, fe, p, k, next, found));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   for (PetscInt j = k; j < next; j++) widest = PetscMax(widest, p->master_start[j + 1] - p->master_start[j]);
   PetscCall(HycoPairsReserve(found, next - k, widest));
   for (PetscInt j = k; j < next; j++)
-    HycoPairsAppend(found, index, p->slave[j], p->master_start[j + 1] - p->master_start[j],
+    HycoPairsAppend(found, index, p->slave[j], p->side[j], p->master_start[j + 1] - p->master_start[j],
                     p->master + p->master_start[j], p->weight + p->master_start[j]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -128,7 +138,7 @@ PetscErrorCode HycoPairsMove(HycoFE fe, HycoPairs *p)
   if (ierr) PetscCall(HycoPairsDestroy(&found));
   PetscCall(ierr);
   /* Slaves and their order do not change, only their masters: rows of B and lambda keep their numbers. */
-  HycoFreeAll(&p->master_start, &p->master, &p->weight, &found.slave, &found.contact);
+  HycoFreeAll(&p->master_start, &p->master, &p->weight, &found.slave, &found.contact, &found.side);
   p->master_start = found.master_start;
   p->master = found.master;
   p->weight = found.weight;
@@ -182,6 +192,8 @@ static PetscErrorCode CheckSlaves(HycoScene scene, HycoMesh m, const PetscInt he
   for (PetscInt k = 0; k < p->n; k++) {
     const PetscInt i = p->slave[k], free = m->dim - held[i];
 
+    /* The sides of one contact are counted once: they differ by more than 40 degrees. */
+    if (k && p->slave[k - 1] == i && p->contact[k - 1] == p->contact[k]) continue;
     /* The first contact, to be named beside the one too many. */
     if (!count[i]++) first[i] = p->contact[k];
     HycoCheck(!free || count[i] <= free,
@@ -200,23 +212,19 @@ static PetscErrorCode AppendNodes(HycoFE fe, PetscInt index, const PetscInt held
 {
   HycoMesh m = fe->mesh;
   HycoContact c = fe->scene->contact[index];
-  PetscBool *carries;
-  PetscInt g = 0;
+  PetscInt g = 0, n, *slave, *side;
 
   PetscFunctionBegin;
   PetscCall(HycoMeshFindGroup(m, "contact", c->slave, &g));
   /* With facts this is a rank's part, on which a group may be empty. */
   HycoCheck(p->facts || m->group_start[g + 1] > m->group_start[g], "contact %s: the group %s is empty", c->name,
             m->group_name[g]);
-  PetscCall(HycoPairsReserve(p, m->group_start[g + 1] - m->group_start[g], 0));
-  PetscCall(PetscMalloc1(m->n_nodes, &carries));
-  HycoSurfaceCarriers(m, g, carries);
-  for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) {
-    const PetscInt i = m->group_node[k];
-
-    if (carries[i] && held[i] < m->dim) HycoPairsAppend(p, index, i, 0, NULL, NULL);
+  PetscCall(HycoContactSlaves(fe, p, index, &n, &slave, &side));
+  PetscCall(HycoPairsReserve(p, n, 0));
+  for (PetscInt k = 0; k < n; k++) {
+    if (held[slave[k]] < m->dim) HycoPairsAppend(p, index, slave[k], side[k], 0, NULL, NULL);
   }
-  PetscCall(PetscFree(carries));
+  HycoFreeAll(&slave, &side);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

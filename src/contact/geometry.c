@@ -73,6 +73,7 @@ static PetscErrorCode Normals(HycoFE fe, HycoContact c, const HycoPairs *pairs, 
     PetscCall(HycoSurfaceVectors(fe, g, vector));
     for (PetscInt k = first; k < last; k++)
       PetscCall(PetscArraycpy(normal + 3 * (k - first), vector + 3 * pairs->slave[k], 3));
+    PetscCall(HycoSideSums(fe, g, last - first, pairs->slave + first, pairs->side + first, normal, NULL));
   } else {
     for (PetscInt i = 0; i < 3 * points->n; i++) {
       if (c->normal[i % 3])

@@ -10,6 +10,40 @@
 #define HYCO_PAST_BORDER 0.1
 /* -- end: in exported models too -- */
 
+/* The master's nodes, on an edge once for each side: a mean normal may oppose no slave. */
+static PetscErrorCode FindNodes(HycoMasterSearch *t)
+{
+  HycoMesh m = t->fe->mesh;
+  const PetscInt gm = t->master, room = m->group_start[gm + 1] - m->group_start[gm];
+  PetscReal *normal, *of;
+  PetscInt n_slots, *slot;
+  PetscBool *carries;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSurfaceSlots(t->fe, gm, &n_slots, &slot));
+  PetscCall(PetscMalloc1(room + n_slots, &t->node));
+  /* In 1D normals are zero, and every patch opposes. */
+  PetscCall(PetscCalloc1(3 * (room + n_slots), &t->normal));
+  PetscCall(PetscMalloc3(m->n_nodes, &carries, 3 * m->n_nodes, &normal, 3 * n_slots, &of));
+  HycoSurfaceCarriers(m, gm, carries);
+  if (m->dim > 1) PetscCall(HycoSurfaceNormals(t->fe, gm, normal));
+  PetscCall(HycoSlotNormals(t->fe, gm, n_slots, slot, of, NULL));
+  for (PetscInt k = m->group_start[gm]; k < m->group_start[gm + 1]; k++) {
+    const PetscInt i = m->group_node[k];
+    PetscInt first, count;
+
+    if (!carries[i]) continue;
+    HycoSlotsOf(n_slots, slot, i, &first, &count);
+    for (PetscInt j = 0; j < PetscMax(count, 1); j++) {
+      if (m->dim > 1) PetscCall(PetscArraycpy(t->normal + 3 * t->n, count ? of + 3 * (first + j) : normal + 3 * i, 3));
+      t->node[t->n++] = i;
+    }
+  }
+  PetscCall(PetscFree3(carries, normal, of));
+  PetscCall(PetscFree(slot));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Patches and their normals: the master's nodes (pair) or facets (surface). Borrowed data of fe: nodes must not move
    while the search exists. Normals are of length 1, outward from the master's body. */
 static PetscErrorCode FindPatches(HycoMasterSearch *t)
@@ -19,24 +53,13 @@ static PetscErrorCode FindPatches(HycoMasterSearch *t)
 
   PetscFunctionBegin;
   t->nf = t->nodes ? 1 : m->nf;
-  PetscCall(PetscMalloc1(PetscMax(m->group_start[gm + 1] - m->group_start[gm], m->n_facets * t->nf), &t->node));
-  /* In 1D normals are zero, and every patch opposes. */
-  PetscCall(PetscCalloc1(3 * PetscMax(m->group_start[gm + 1] - m->group_start[gm], m->n_facets), &t->normal));
   if (t->nodes) {
-    PetscBool *carries;
-    PetscReal *normal;
-
-    PetscCall(PetscMalloc2(m->n_nodes, &carries, 3 * m->n_nodes, &normal));
-    HycoSurfaceCarriers(m, gm, carries);
-    if (m->dim > 1) PetscCall(HycoSurfaceNormals(t->fe, gm, normal));
-    for (PetscInt k = m->group_start[gm]; k < m->group_start[gm + 1]; k++) {
-      if (!carries[m->group_node[k]]) continue;
-      if (m->dim > 1) PetscCall(PetscArraycpy(t->normal + 3 * t->n, normal + 3 * m->group_node[k], 3));
-      t->node[t->n++] = m->group_node[k];
-    }
-    PetscCall(PetscFree2(carries, normal));
+    PetscCall(FindNodes(t));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  PetscCall(PetscMalloc1(m->n_facets * t->nf, &t->node));
+  /* In 1D normals are zero, and every patch opposes. */
+  PetscCall(PetscCalloc1(3 * m->n_facets, &t->normal));
   for (PetscInt f = 0; f < m->n_facets; f++) {
     if (m->facet_group[f] != gm) continue;
     if (m->dim > 1) PetscCall(HycoFacetVector(t->fe, f, t->normal + 3 * t->n));
@@ -46,9 +69,42 @@ static PetscErrorCode FindPatches(HycoMasterSearch *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The sides of the slave's nodes on edges as further slaves. */
+static PetscErrorCode AddSlots(HycoMasterSearch *t)
+{
+  const HycoFE fe = t->fe;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSurfaceSlots(fe, t->slave, &t->n_slots, &t->slot));
+  if (!t->n_slots) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(3 * (t->n_nodes + t->n_slots), &t->own));
+  PetscCall(PetscRealloc((size_t)(3 * (t->n_nodes + t->n_slots)) * sizeof(PetscReal), &t->outward));
+  PetscCall(PetscArraycpy(t->own, fe->X, 3 * t->n_nodes));
+  for (PetscInt j = 0; j < t->n_slots; j++)
+    PetscCall(PetscArraycpy(t->own + 3 * (t->n_nodes + j), fe->X + 3 * (t->slot[j] / HYCO_SIDES), 3));
+  t->X = t->own;
+  PetscCall(HycoSlotNormals(fe, t->slave, t->n_slots, t->slot, t->outward + 3 * t->n_nodes, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscInt HycoMasterSearchSlave(const HycoMasterSearch *t, PetscInt node, PetscInt side)
+{
+  PetscInt first, n;
+
+  HycoMasterSearchSides(t, node, side, &first, &n);
+  return side < 0 ? node : first;
+}
+
+void HycoMasterSearchSides(const HycoMasterSearch *t, PetscInt node, PetscInt side, PetscInt *first, PetscInt *n)
+{
+  HycoSlotsOf(t->n_slots, t->slot, node, first, n);
+  *first = *n ? t->n_nodes + *first + PetscMin(PetscMax(side, 0), *n - 1) : node;
+  if (!*n || side >= 0) *n = 1;
+}
+
 /* The groups of a contact by name: on a rank's part they may be empty, and the search then has no patches. `nodes`:
    masters are nodes (pair), not points of facets. */
-PetscErrorCode HycoMasterSearchCreate(HycoFE fe, HycoContact c, PetscBool nodes, HycoMasterSearch *t)
+PetscErrorCode HycoMasterSearchCreate(HycoFE fe, HycoContact c, PetscBool nodes, PetscInt edges, HycoMasterSearch *t)
 {
   PetscInt slave, master;
 
@@ -56,6 +112,8 @@ PetscErrorCode HycoMasterSearchCreate(HycoFE fe, HycoContact c, PetscBool nodes,
   PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &slave));
   PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->master, &master));
   PetscCall(HycoMasterSearchCreateOn(fe, slave, master, nodes, t));
+  t->edges = edges;
+  PetscCall(AddSlots(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -101,7 +159,7 @@ PetscErrorCode HycoMasterSearchDestroy(HycoMasterSearch *t)
 {
   PetscFunctionBegin;
   PetscCall(HycoMasterSearchForget(t));
-  HycoFreeAll(&t->node, &t->normal, &t->outward);
+  HycoFreeAll(&t->node, &t->normal, &t->outward, &t->slot, &t->own);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -125,22 +183,6 @@ static PetscReal ShortestEdge(const HycoMasterSearch *t, PetscInt patch)
   return shortest;
 }
 
-/* The nearest point whose facet opposes the slave's normal; any_side: the nearest point whatever its normal. Where
-   the nearest one does not oppose, another facet at the same point may, within HYCO_SAME_POINT. */
-void HycoMasterSearchProject(const HycoMasterSearch *t, PetscInt slave, PetscBool any_side, HycoProjection *at)
-{
-  const PetscReal *out = HycoMasterSearchOutward(t, slave), *x = t->X + 3 * slave;
-  HycoProjection nearest;
-
-  HycoPatchesProject(t->patches, x, NULL, &nearest);
-  *at = nearest;
-  if (any_side || !out || !at->n || HycoDot(out, t->normal + 3 * at->patch) <= HYCO_OPPOSED) return;
-  /* The second search has the condition on normals inside, and its result may be a far one, which is why distances
-     are compared. */
-  HycoPatchesProject(t->patches, x, out, at); /* at a corner: of the facets that contain the point */
-  if (at->n && at->distance > nearest.distance + HYCO_SAME_POINT * ShortestEdge(t, at->patch)) at->n = 0;
-}
-
 /* The vector from the slave to its master point, at the current nodes. */
 void HycoMasterSearchAcross(const HycoMasterSearch *t, PetscInt slave, const HycoProjection *at, PetscReal r[3])
 {
@@ -148,6 +190,26 @@ void HycoMasterSearchAcross(const HycoMasterSearch *t, PetscInt slave, const Hyc
     r[c] = -t->X[3 * slave + c];
     for (PetscInt a = 0; a < at->n; a++) r[c] += at->weight[a] * t->X[3 * at->node[a] + c];
   }
+}
+
+/* The nearest point whose facet opposes the slave's normal; any_side: the nearest point whatever its normal. Where
+   the nearest one does not oppose, another facet at the same point may, within HYCO_SAME_POINT; where surfaces go round
+   edges also a farther one that lies in front of the slave, as the wall of a corner near whose floor the slave is. */
+void HycoMasterSearchProject(const HycoMasterSearch *t, PetscInt slave, PetscBool any_side, HycoProjection *at)
+{
+  const PetscReal *out = HycoMasterSearchOutward(t, slave), *x = t->X + 3 * slave;
+  HycoProjection nearest;
+  PetscReal r[3];
+
+  HycoPatchesProject(t->patches, x, NULL, &nearest);
+  *at = nearest;
+  if (any_side || !out || !at->n || HycoDot(out, t->normal + 3 * at->patch) <= HYCO_OPPOSED) return;
+  /* The second search has the condition on normals inside, and its result may be a far one, which is why distances
+     are compared. */
+  HycoPatchesProject(t->patches, x, out, at); /* at a corner: of the facets that contain the point */
+  if (!at->n || at->distance <= nearest.distance + HYCO_SAME_POINT * ShortestEdge(t, at->patch)) return;
+  HycoMasterSearchAcross(t, slave, at, r);
+  if (!t->edges || HycoDot(r, out) < -HYCO_OPPOSED * at->distance) at->n = 0;
 }
 
 /* Edges as pairs of ascending nodes. */

@@ -18,20 +18,37 @@ typedef struct {
   HycoPatches patches;        /* the master's; NULL until HycoMasterSearchReady() */
   PetscInt n, nf, *node;      /* patches' nodes, n x nf */
   PetscReal *normal;          /* n x 3, of the patches (for a pair: of its nodes); 0: unknown */
-  PetscReal *outward;         /* by node x 3, outward normal of the slave's surface; 0: unknown */
+  PetscReal *outward;         /* by node and slot x 3, outward normal of the slave's surface; 0: unknown */
+  PetscInt n_slots, *slot;    /* nodes on an edge of the slave, HYCO_SIDES * node + side, ascending: in searches the
+                                 slave n_nodes + j is the j-th of them, with its own normal */
+  PetscReal *own;             /* X with the slots' positions; NULL: there are none */
+  PetscInt edges;             /* as in HycoSurfaceFacts */
   PetscInt n_border, *border; /* edges (2D: ends) of one facet only, as sorted pairs of nodes; created when needed */
   PetscBool *at_border;       /* by node; NULL: not created */
 } HycoMasterSearch;
 /* -- end: in exported models too -- */
 
-/* Creates the search on fe's nodes. The caller destroys it. */
-PetscErrorCode HycoMasterSearchCreate(HycoFE fe, HycoContact contact, PetscBool nodes, HycoMasterSearch *search);
-/* The same between two groups. */
+/* Creates the search on fe's nodes; edges: as in HycoSurfaceFacts. The caller destroys it. */
+PetscErrorCode HycoMasterSearchCreate(HycoFE fe, HycoContact contact, PetscBool nodes, PetscInt edges,
+                                      HycoMasterSearch *search);
+/* The same between two groups, whose edges have no sides. */
 PetscErrorCode HycoMasterSearchCreateOn(HycoFE fe, PetscInt slave, PetscInt master, PetscBool nodes,
                                         HycoMasterSearch *search);
 PetscErrorCode HycoMasterSearchDestroy(HycoMasterSearch *search);
 /* Creates the tree of the patches, unless it exists: before the first projection. */
 PetscErrorCode HycoMasterSearchReady(HycoMasterSearch *search);
+/* The node and the side of a slave of the search; the slave of a side (HYCO_ONE_SIDE: the node as a whole). */
+static inline PetscInt HycoMasterSearchNode(const HycoMasterSearch *search, PetscInt slave)
+{
+  return slave < search->n_nodes ? slave : search->slot[slave - search->n_nodes] / HYCO_SIDES;
+}
+static inline PetscInt HycoMasterSearchSide(const HycoMasterSearch *search, PetscInt slave)
+{
+  return slave < search->n_nodes ? HYCO_ONE_SIDE : search->slot[slave - search->n_nodes] % HYCO_SIDES;
+}
+PetscInt HycoMasterSearchSlave(const HycoMasterSearch *search, PetscInt node, PetscInt side);
+/* The slaves first .. first + n - 1 of a contact: its side, or, without one, all sides of its node. */
+void HycoMasterSearchSides(const HycoMasterSearch *search, PetscInt node, PetscInt side, PetscInt *first, PetscInt *n);
 /* Frees what was created when it was needed: the tree and the border. */
 PetscErrorCode HycoMasterSearchForget(HycoMasterSearch *search);
 /* The slave node's outward normal; NULL: unknown, because its group is not a surface. */
@@ -60,7 +77,7 @@ typedef enum { HYCO_FOUND, HYCO_FAR, HYCO_TURNED, HYCO_ASKEW, HYCO_PAST } HycoVe
    slave's shortest edge, they touch. */
 typedef struct {
   PetscInt n;
-  const PetscInt *slave;
+  PetscInt *slave;
   PetscReal tolerance, small;
   HycoProjection *at;
   HycoVerdict *why;
@@ -77,6 +94,11 @@ typedef struct {
 /* The masters of n slave nodes. */
 PetscErrorCode HycoMasterSearchFind(HycoMasterSearch *search, const HycoQuery *query, PetscInt n,
                                     const PetscInt slave[], HycoProjection at[], HycoVerdict why[]);
+/* The same of one contact, the best over the sides of the node that it stands for; whether a result is better than another:
+   it has a master, and a nearer one, or looks at one that is too far. */
+PetscErrorCode HycoMasterSearchNearest(HycoMasterSearch *search, const HycoQuery *query, PetscInt node, PetscInt side,
+                                       HycoProjection *at, HycoVerdict *why);
+PetscBool HycoVerdictIsBetter(const HycoProjection *at, HycoVerdict why, const HycoProjection *best, HycoVerdict other);
 /* A type's choice of masters from the nearest points. */
 typedef PetscErrorCode (*HycoSettle)(HycoMasterSearch *search, HycoContact contact, HycoMatch *match);
 /* What to do about n slave nodes without a master, as the end of a message. */

@@ -42,9 +42,9 @@ void HycoSideSet(const HycoPlane *plane, PetscInt nf, PetscInt corners, const Pe
 void HycoSideFunctions(const HycoSide *side, const PetscReal at[2], PetscReal N[HYCO_FACET_NODES]);
 /* The common part of two sides in the plane; size 0: none. */
 void HycoPieceCut(PetscInt dim, const HycoSide *slave, const HycoSide *master, HycoPiece *piece);
-/* Appends the n slaves of contact number `index` to pairs, with their masters at fe's nodes at most `reach` away. */
-PetscErrorCode HycoMortarRows(HycoContact contact, HycoFE fe, PetscInt index, PetscReal reach, PetscInt n,
-                              const PetscInt slave[], HycoPairs *pairs);
+/* Appends the contacts first .. last - 1 of `of` to pairs, with their masters at fe's nodes at most `reach` away. */
+PetscErrorCode HycoMortarRows(HycoContact contact, HycoFE fe, const HycoPairs *of, PetscInt first, PetscInt last,
+                              PetscReal reach, HycoPairs *pairs);
 /* The same for a tie of two groups on fe's nodes: rows of the n slaves; the slave group's other nodes follow the points
    pin[] (by node), and the rows around them take over the forces of their functions. */
 PetscErrorCode HycoMortarTie(HycoFE fe, PetscInt slaves, PetscInt masters, const HycoProjection pin[], PetscInt n,

@@ -40,9 +40,10 @@ typedef struct {
   HycoMasterSearch t;
   HycoPatches patches;
   HycoRule rule;
-  PetscInt corners;
+  PetscInt corners, edges; /* edges: as in HycoSurfaceFacts */
   PetscReal reach;
-  PetscInt *row;             /* by node: its place among the slaves, -1: none */
+  PetscInt *row;             /* by node and slot: its place among the slaves, -1: none */
+  PetscInt n_slots, *slot;   /* of the slave's nodes on edges, as in HycoMasterSearch */
   PetscReal *D;              /* by row: of all facets */
   const HycoProjection *pin; /* by node: the point that a slave without a row follows (n = 0: none); NULL: no ties */
   PetscInt *taker;           /* with pin, by node: the row that takes its forces where no node of a facet can, or -1 */
@@ -50,6 +51,7 @@ typedef struct {
   /* of the current facet */
   HycoPlane plane;
   PetscReal size, facing; /* its area; of the part that faces the master */
+  PetscBool front;        /* only what lies in front of it can face it: the nearest part of the master does not */
   PetscReal M[HYCO_FACET_NODES][HYCO_FACET_NODES], own[HYCO_FACET_NODES]; /* integrals of N_i N_k, of N_i */
   PetscInt n_blocks, room_blocks;
   Block *block;
@@ -60,7 +62,7 @@ typedef struct {
 /* Second-order quadrilaterals have products of degree 8, triangles of degree 4; on a circle the radius is one more. The
    degree of the quadrature rule follows. */
 static PetscErrorCode MortarCreate(HycoFE fe, PetscInt slaves, PetscInt masters, PetscReal reach, PetscInt n,
-                                   const PetscInt slave[], Mortar *s)
+                                   const PetscInt slave[], const PetscInt side[], Mortar *s)
 {
   HycoMesh m = fe->mesh;
   const PetscInt order = HycoMeshIsQuadratic(m) ? 2 : 1;
@@ -73,11 +75,17 @@ static PetscErrorCode MortarCreate(HycoFE fe, PetscInt slaves, PetscInt masters,
   PetscCall(
       HycoRuleCreate(m->dim, 2 * order * (s->corners == 4 ? 2 : 1) + (fe->formulation == HYCO_AXISYMMETRIC), &s->rule));
   PetscCall(HycoMasterSearchCreateOn(fe, slaves, masters, PETSC_FALSE, &s->t));
-  PetscCall(PetscMalloc3(m->n_nodes, &s->row, n, &s->D, s->t.n, &s->near));
+  if (side) PetscCall(HycoSurfaceSlots(fe, slaves, &s->n_slots, &s->slot));
+  PetscCall(PetscMalloc3(m->n_nodes + s->n_slots, &s->row, n, &s->D, s->t.n, &s->near));
   PetscCall(PetscArrayzero(s->D, n));
   /* -1: a node of the surface that is no slave here (fixed, or another rank's). */
-  for (PetscInt i = 0; i < m->n_nodes; i++) s->row[i] = -1;
-  for (PetscInt k = 0; k < n; k++) s->row[slave[k]] = k;
+  for (PetscInt i = 0; i < m->n_nodes + s->n_slots; i++) s->row[i] = -1;
+  for (PetscInt k = 0; k < n; k++) {
+    PetscInt at = -1;
+
+    if (side && side[k] >= 0) PetscCall(PetscFindInt(HYCO_SIDES * slave[k] + side[k], s->n_slots, s->slot, &at));
+    s->row[at < 0 ? slave[k] : m->n_nodes + at] = k;
+  }
   if (s->t.n && n) PetscCall(HycoPatchesCreate(fe->X, s->t.n, m->nf, s->corners, s->t.node, s->t.normal, &s->patches));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -87,7 +95,7 @@ static PetscErrorCode MortarDestroy(Mortar *s)
 {
   PetscFunctionBegin;
   PetscCall(PetscFree3(s->row, s->D, s->near));
-  PetscCall(PetscFree(s->taker));
+  HycoFreeAll(&s->taker, &s->slot);
   PetscCall(HycoPatchesDestroy(&s->patches));
   PetscCall(HycoMasterSearchDestroy(&s->t));
   HycoFreeAll(&s->block, &s->term);
@@ -124,7 +132,7 @@ static void AddSimplex(Mortar *s, const HycoPlane *plane, const HycoSide *slave,
   }
 }
 
-/* The distance of the two sides along the normal at the middle of a piece. */
+/* The distance of the two sides along the normal at the middle of a piece; below 0 they overlap. */
 static PetscReal Height(const HycoSide *slave, const HycoSide *master, const HycoPiece *piece)
 {
   PetscReal at[2] = {0, 0}, N[HYCO_FACET_NODES], height = 0;
@@ -140,7 +148,7 @@ static PetscReal Height(const HycoSide *slave, const HycoSide *master, const Hyc
     HycoSideFunctions(&flat, at, N);
     for (PetscInt a = 0; a < flat.corners; a++) height += (side ? -1 : 1) * N[a] * flat.height[a];
   }
-  return PetscAbsReal(height);
+  return height;
 }
 
 /* Adds the piece of one facet of the master, unless it is farther than `limit`. */
@@ -149,13 +157,17 @@ static PetscErrorCode AddPiece(Mortar *s, const HycoPlane *plane, const HycoSide
 {
   HycoSide master;
   HycoPiece piece;
+  PetscReal height;
   Block *b;
 
   PetscFunctionBegin;
   HycoSideSet(plane, s->t.nf, s->corners, s->t.node + patch * s->t.nf, s->t.X, &master);
   HycoPieceCut(plane->dim, slave, &master, &piece);
   /* The nearer of two layers is kept by the limit on the height, and slivers of round-off would only add masters. */
-  if (!(piece.size > ROUND_OFF * s->size) || Height(slave, &master, &piece) > limit) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!(piece.size > ROUND_OFF * s->size)) PetscFunctionReturn(PETSC_SUCCESS);
+  height = Height(slave, &master, &piece);
+  if (PetscAbsReal(height) > limit || (s->front && height < -HYCO_SAME_POINT * plane->radius))
+    PetscFunctionReturn(PETSC_SUCCESS);
   HycoGrow(s->n_blocks, s->room_blocks, s->block);
   b = &s->block[s->n_blocks++];
   b->nf = master.nf;
@@ -200,6 +212,20 @@ static PetscReal SizeOf(PetscInt dim, const HycoSide *side)
   return whole.size;
 }
 
+/* The nearest point of the master to the facet's centre. Where surfaces go round edges, and it is on a facet that does not
+   oppose, the nearest one that does, in front: the wall of a corner, beside its floor. */
+static void FindNearest(Mortar *s, HycoProjection *at)
+{
+  const HycoPlane *plane = &s->plane;
+  HycoProjection opposed;
+
+  HycoPatchesProject(s->patches, plane->centre, NULL, at);
+  s->front = (PetscBool)(s->edges && HycoDot(s->t.normal + 3 * at->patch, plane->normal) > HYCO_OPPOSED);
+  if (!s->front) return;
+  HycoPatchesProject(s->patches, plane->centre, plane->normal, &opposed);
+  if (opposed.n) *at = opposed;
+}
+
 /* The pieces of facet f. Along its normal the master may be as far as a facet in the limit angle to it whose nearest
    point is as far as that of the middle; of two layers the nearer one is taken, by lower limits. */
 static PetscErrorCode FindPieces(Mortar *s, PetscInt f, HycoSide *slave)
@@ -222,7 +248,7 @@ static PetscErrorCode FindPieces(Mortar *s, PetscInt f, HycoSide *slave)
   HycoSideSet(plane, m->nf, s->corners, node, s->fe->X, slave);
   s->size = SizeOf(m->dim, slave);
   /* Its distance bounds how far the facing part can be. */
-  HycoPatchesProject(s->patches, plane->centre, NULL, &at);
+  FindNearest(s, &at);
   limit = PetscMin(s->reach, (at.distance + plane->radius) / -HYCO_OPPOSED);
   prism.radius = plane->radius;
   prism.along = limit + plane->radius; /* the facet may be warped */
@@ -369,6 +395,18 @@ static PetscErrorCode AddPins(Mortar *s, const HycoSide *slave)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The row of node a of facet f: of the node, or on an edge of the facet's side; -1: none. */
+static PetscInt RowOf(const Mortar *s, PetscInt f, PetscInt a)
+{
+  const HycoMesh m = s->fe->mesh;
+  const PetscInt at = f * m->nf + a, node = m->facets[at];
+  PetscInt slot = -1;
+
+  if (s->row[node] >= 0 || !s->n_slots || m->facet_side[at] < 0) return s->row[node];
+  (void)PetscFindInt(HYCO_SIDES * node + m->facet_side[at], s->n_slots, s->slot, &slot);
+  return slot < 0 ? -1 : s->row[m->n_nodes + slot];
+}
+
 /* Adds a facet's part to the rows of its nodes, in proportion to the nodes' integrals; a node without an integral takes
    the facet's: on the axis of cells of second order, and, in ties, the corners of their triangles. */
 static PetscErrorCode AddFacet(Mortar *s, PetscInt f)
@@ -380,7 +418,7 @@ static PetscErrorCode AddFacet(Mortar *s, PetscInt f)
   PetscCall(FindPieces(s, f, &slave));
   if (s->n_blocks) PetscCall(MakeDual(s, &slave, &usable));
   for (PetscInt i = 0; usable && i < slave.nf; i++) {
-    const PetscInt row = s->row[slave.node[i]];
+    const PetscInt row = RowOf(s, f, i);
     const PetscReal share = Carries(s, i, slave.node[i]) ? s->own[i] : s->size;
 
     if (row < 0) continue;
@@ -428,7 +466,8 @@ static PetscErrorCode Merge(const Mortar *s, PetscInt n, PetscInt place[], Petsc
 }
 
 /* Appends all rows: the terms are counted by row first. */
-static PetscErrorCode Append(const Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[], HycoPairs *pairs)
+static PetscErrorCode Append(const Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[], const PetscInt side[],
+                             HycoPairs *pairs)
 {
   PetscInt *start, *place, *node;
   PetscReal *weight;
@@ -448,7 +487,7 @@ static PetscErrorCode Append(const Mortar *s, PetscInt index, PetscInt n, const 
 
     /* Terms of one master from several facets become one, divided by D of the row. */
     PetscCall(Merge(s, start[k + 1] - start[k], place + start[k], s->D[k], node, weight, &masters));
-    HycoPairsAppend(pairs, index, slave[k], masters, node, weight);
+    HycoPairsAppend(pairs, index, slave[k], side ? side[k] : HYCO_ONE_SIDE, masters, node, weight);
   }
   PetscCall(PetscFree3(place, node, weight));
   PetscCall(PetscFree(start));
@@ -484,7 +523,8 @@ static PetscErrorCode FindTakers(Mortar *s)
 
 /* In the order of the mesh's facets. A facet without rows of this rank is skipped, except in ties, whose pinned
    nodes give to rows of other facets. */
-static PetscErrorCode Integrate(Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[], HycoPairs *pairs)
+static PetscErrorCode Integrate(Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[], const PetscInt side[],
+                                HycoPairs *pairs)
 {
   HycoMesh m = s->fe->mesh;
 
@@ -494,26 +534,28 @@ static PetscErrorCode Integrate(Mortar *s, PetscInt index, PetscInt n, const Pet
 
     /* In a fixed order: sums do not depend on the ranks. */
     if (m->facet_group[f] != s->t.slave) continue;
-    for (PetscInt a = 0; a < m->nf; a++) any = (PetscBool)(any || s->row[m->facets[f * m->nf + a]] >= 0);
+    for (PetscInt a = 0; a < m->nf; a++) any = (PetscBool)(any || RowOf(s, f, a) >= 0);
     if (any) PetscCall(AddFacet(s, f));
   }
-  PetscCall(Append(s, index, n, slave, pairs));
+  PetscCall(Append(s, index, n, slave, side, pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The slave's and the master's groups are those of t. `s` is destroyed after an error as well. */
-static PetscErrorCode Run(Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[], HycoPairs *pairs)
+static PetscErrorCode Run(Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[], const PetscInt side[],
+                          HycoPairs *pairs)
 {
   PetscFunctionBegin;
-  HycoFinally(Integrate(s, index, n, slave, pairs), PetscCall(MortarDestroy(s)));
+  HycoFinally(Integrate(s, index, n, slave, side, pairs), PetscCall(MortarDestroy(s)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Slaves of this rank only, with all facets around them here: a row is then complete without communication. Not
    collective. */
-PetscErrorCode HycoMortarRows(HycoContact c, HycoFE fe, PetscInt index, PetscReal reach, PetscInt n,
-                              const PetscInt slave[], HycoPairs *pairs)
+PetscErrorCode HycoMortarRows(HycoContact c, HycoFE fe, const HycoPairs *of, PetscInt first, PetscInt last,
+                              PetscReal reach, HycoPairs *pairs)
 {
+  const PetscInt n = last - first, *slave = of->slave + first, *side = of->side + first;
   PetscInt slaves, masters;
   Mortar s;
   PetscErrorCode ierr;
@@ -523,8 +565,9 @@ PetscErrorCode HycoMortarRows(HycoContact c, HycoFE fe, PetscInt index, PetscRea
   PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->master, &masters));
   PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_TRUE));
   /* Also after an error Run() has freed what was made. */
-  ierr = MortarCreate(fe, slaves, masters, reach, n, slave, &s);
-  if (!ierr) ierr = Run(&s, index, n, slave, pairs);
+  ierr = MortarCreate(fe, slaves, masters, reach, n, slave, side, &s);
+  if (!ierr) ierr = HycoPairsEdges(fe, of, of->contact[first], &s.edges);
+  if (!ierr) ierr = Run(&s, of->contact[first], n, slave, side, pairs);
   PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_FALSE));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -538,9 +581,9 @@ PetscErrorCode HycoMortarTie(HycoFE fe, PetscInt slaves, PetscInt masters, const
   Mortar s;
 
   PetscFunctionBegin;
-  PetscCall(MortarCreate(fe, slaves, masters, PETSC_MAX_REAL, n, slave, &s));
+  PetscCall(MortarCreate(fe, slaves, masters, PETSC_MAX_REAL, n, slave, NULL, &s));
   s.pin = pin;
   PetscCall(FindTakers(&s));
-  PetscCall(Run(&s, 0, n, slave, pairs));
+  PetscCall(Run(&s, 0, n, slave, NULL, pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -45,18 +45,19 @@ static PetscErrorCode FixedAtObstacles(HycoFE fe, const HycoPairs *pairs, HycoPa
 {
   HycoMesh m = fe->mesh;
   HycoScene s = fe->scene;
-  PetscBool *is_slave, *carries;
+  PetscBool *is_slave;
   PetscInt room = 0;
 
   PetscFunctionBegin;
   PetscCall(PetscMemzero(still, sizeof(*still)));
-  PetscCall(PetscCalloc2(m->n_nodes, &is_slave, m->n_nodes, &carries));
-  for (PetscInt k = 0; k < s->n_contacts; k++) room += s->contact[k]->master ? 0 : m->n_nodes;
+  PetscCall(PetscCalloc1(m->n_nodes, &is_slave));
+  for (PetscInt k = 0; k < s->n_contacts; k++) room += s->contact[k]->master ? 0 : HYCO_SIDES * m->n_nodes;
   PetscCall(PetscMalloc1(room, &still->slave));
   PetscCall(PetscMalloc1(room, &still->contact));
+  PetscCall(PetscMalloc1(room, &still->side));
   PetscCall(PetscCalloc1(room + 1, &still->master_start));
   for (PetscInt k = 0; k < s->n_contacts; k++) {
-    PetscInt g = 0;
+    PetscInt n, *slave, *side;
 
     /* With a master the contact acts on its nodes, whatever the slave is. */
     if (s->contact[k]->master) continue;
@@ -64,20 +65,20 @@ static PetscErrorCode FixedAtObstacles(HycoFE fe, const HycoPairs *pairs, HycoPa
     for (PetscInt j = 0; j < pairs->n; j++) {
       if (pairs->contact[j] == k) is_slave[pairs->slave[j]] = PETSC_TRUE;
     }
-    PetscCall(HycoMeshFindGroup(m, "contact", s->contact[k]->slave, &g));
-    /* Corners of second-order triangles carry no contact: nothing to check there. */
-    HycoSurfaceCarriers(m, g, carries);
-    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) {
-      const PetscInt i = m->group_node[j];
-      PetscBool fixed = (PetscBool)(carries[i] && !is_slave[i] && HycoMeshTied(m, i) < 0);
+    PetscCall(HycoContactSlaves(fe, pairs, k, &n, &slave, &side));
+    for (PetscInt j = 0; j < n; j++) {
+      const PetscInt i = slave[j];
+      PetscBool fixed = (PetscBool)(!is_slave[i] && HycoMeshTied(m, i) < 0);
 
       for (PetscInt c = 0; c < fe->dim; c++) fixed = (PetscBool)(fixed && fe->fixed[i * fe->dim + c]);
       if (!fixed) continue;
       still->slave[still->n] = i;
+      still->side[still->n] = side[j];
       still->contact[still->n++] = k;
     }
+    HycoFreeAll(&slave, &side);
   }
-  PetscCall(PetscFree2(is_slave, carries));
+  PetscCall(PetscFree(is_slave));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -46,8 +46,8 @@ static PetscErrorCode Describe(HycoMasterSearch *t, const Missed *missed, size_t
   /* First among facets that face it, then among all: the message needs a distance in any case. */
   if (!at.n) HycoMasterSearchProject(t, missed->node, PETSC_TRUE, &at);
   PetscCall(HycoMasterSearchAtBorder(t, &at, &border));
-  snprintf(text, room, "%d (%.4g away%s", (int)t->fe->mesh->node_id[missed->node], (double)at.distance,
-           border ? ", past its border" : "");
+  snprintf(text, room, "%d (%.4g away%s", (int)t->fe->mesh->node_id[HycoMasterSearchNode(t, missed->node)],
+           (double)at.distance, border ? ", past its border" : "");
   used = strlen(text);
   if (missed->why == HYCO_TURNED || missed->why == HYCO_ASKEW)
     snprintf(text + used, room - used, ", %.0f degrees %s", (double)Angle(t, missed->node, missed->why, &at),
@@ -75,7 +75,7 @@ static PetscErrorCode Complain(HycoMasterSearch *t, HycoContact c, HycoRemedy re
     PetscCall(PetscStrlcat(list, one, sizeof(list)));
   }
   PetscCall(PetscMalloc1(n, &node));
-  for (PetscInt k = 0; k < n; k++) node[k] = missed[k].node;
+  for (PetscInt k = 0; k < n; k++) node[k] = missed[k].node; /* slaves of the search */
   /* The type knows what helps: another tolerance, another type, other surfaces. */
   PetscCall((*remedy)(t, c, n, node, what));
   PetscCall(PetscFree(node));
@@ -125,8 +125,8 @@ static PetscErrorCode RefuseAll(HycoMasterSearch *t, HycoContact c, const HycoMa
             c->name, c->slave, c->master, (double)m->tolerance);
   HycoFail("contact %s: no node of %s is within contact_%s_tolerance %g of %s; the nearest that faces it, node %d, is "
            "%.4g away: give a larger tolerance, or remove the contact",
-           c->name, c->slave, c->name, (double)m->tolerance, c->master, (int)t->fe->mesh->node_id[node],
-           (double)nearest);
+           c->name, c->slave, c->name, (double)m->tolerance, c->master,
+           (int)t->fe->mesh->node_id[HycoMasterSearchNode(t, node)], (double)nearest);
 }
 
 /* Adds each slave node with its master, or fails for those without one. n = 0 in a match: a node that faces no master,
@@ -146,11 +146,42 @@ static PetscErrorCode AppendMatched(HycoMasterSearch *t, HycoContact c, PetscInt
       continue;
     }
     n_alone += !m->at[k].n;
-    HycoPairsAppend(p, index, m->slave[k], m->at[k].n, m->at[k].node, m->at[k].weight);
+    HycoPairsAppend(p, index, HycoMasterSearchNode(t, m->slave[k]),
+                    HycoContactAverages(c) ? HycoMasterSearchSide(t, m->slave[k]) : HYCO_ONE_SIDE, m->at[k].n,
+                    m->at[k].node, m->at[k].weight);
   }
   if (n_missed) PetscCall(Complain(t, c, remedy, n_missed, missed, m));
   if (n_alone == m->n && !m->part) PetscCall(RefuseAll(t, c, m));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether slave i of a node's sides is kept, of which `best` is the first that is not worse than the others: each with a
+   master, if the normals are those of the sides; else the nearest, or the best. A slave that does not look at the master has
+   no contact if its surface goes round an edge: such a surface has them by nature. */
+static PetscBool IsKept(const HycoMasterSearch *t, HycoContact c, const HycoMatch *m, PetscInt i, PetscInt best)
+{
+  if (m->why[best] != HYCO_FOUND && m->why[best] != HYCO_FAR && (t->edges & HYCO_SLAVE_EDGE)) return PETSC_FALSE;
+  return (PetscBool)(i == best || (m->why[i] == HYCO_FOUND && HycoContactAverages(c)));
+}
+
+/* Leaves out the sides of nodes on edges that have no contact. */
+static void DropSides(const HycoMasterSearch *t, HycoContact c, HycoMatch *m)
+{
+  PetscInt n = 0;
+
+  for (PetscInt k = 0, next, best = 0; k < m->n; k = next) {
+    for (next = best = k; next < m->n; next++) {
+      if (HycoMasterSearchNode(t, m->slave[next]) != HycoMasterSearchNode(t, m->slave[k])) break;
+      if (HycoVerdictIsBetter(&m->at[next], m->why[next], &m->at[best], m->why[best])) best = next;
+    }
+    for (PetscInt i = k; i < next; i++) {
+      if (!IsKept(t, c, m, i, best)) continue;
+      m->slave[n] = m->slave[i];
+      m->at[n] = m->at[i];
+      m->why[n++] = m->why[i];
+    }
+  }
+  m->n = n;
 }
 
 /* The whole matching, once the search and the slave nodes exist. */
@@ -169,7 +200,9 @@ static PetscErrorCode Match(HycoMasterSearch *t, HycoContact c, PetscInt index, 
   PetscCall(HycoPairsReserve(p, m->n, t->nf));
   PetscCall(CheckApart(t, c));
   /* Without `settle`, masters are found on moved nodes: here only the slaves are listed. */
-  for (PetscInt k = 0; k < m->n && !settle; k++) HycoPairsAppend(p, index, m->slave[k], 0, NULL, NULL);
+  for (PetscInt k = 0; k < m->n && !settle; k++)
+    HycoPairsAppend(p, index, HycoMasterSearchNode(t, m->slave[k]), HycoMasterSearchSide(t, m->slave[k]), 0, NULL,
+                    NULL);
   if (!settle) PetscFunctionReturn(PETSC_SUCCESS);
   m->small = m->part ? p->facts[index].small : HycoSurfaceTolerance(t->fe->mesh, t->slave);
   PetscCall(HycoContactGetLength(c, "tolerance", &m->tolerance));
@@ -179,6 +212,7 @@ static PetscErrorCode Match(HycoMasterSearch *t, HycoContact c, PetscInt index, 
   query.small = m->small;
   p->queries += m->n;
   ierr = HycoMasterSearchFind(t, &query, m->n, m->slave, m->at, m->why);
+  if (!ierr) DropSides(t, c, m);
   if (!ierr) ierr = (*settle)(t, c, m);
   if (!ierr) ierr = AppendMatched(t, c, index, remedy, m, missed, p);
   PetscCall(PetscFree3(m->at, m->why, missed));
@@ -198,8 +232,8 @@ static PetscBool Follows(HycoMesh m, PetscInt node, const PetscBool carries[])
 }
 
 /* The slave nodes that take contact forces, without tied nodes that follow others of them and without those of other
-   ranks; the caller frees them. */
-static PetscErrorCode FindSlaves(const HycoMasterSearch *t, PetscInt *n, PetscInt **slave)
+   ranks, on edges each of their sides (each: where their normals are the contacts'); the caller frees them. */
+static PetscErrorCode FindSlaves(const HycoMasterSearch *t, PetscBool each, PetscInt *n, PetscInt **slave)
 {
   HycoMesh m = t->fe->mesh;
   PetscBool *carries;
@@ -207,13 +241,17 @@ static PetscErrorCode FindSlaves(const HycoMasterSearch *t, PetscInt *n, PetscIn
   PetscFunctionBegin;
   *n = 0;
   PetscCall(PetscMalloc1(m->n_nodes, &carries));
-  PetscCall(PetscMalloc1(m->group_start[t->slave + 1] - m->group_start[t->slave], slave));
+  PetscCall(PetscMalloc1(m->group_start[t->slave + 1] - m->group_start[t->slave] + t->n_slots, slave));
   /* Which nodes a uniform pressure pushes, by the cell type. */
   HycoSurfaceCarriers(m, t->slave, carries);
   for (PetscInt k = m->group_start[t->slave]; k < m->group_start[t->slave + 1]; k++) {
     const PetscInt i = m->group_node[k];
 
-    if (carries[i] && HycoMeshOwned(m, i) >= 0 && !Follows(m, i, carries)) (*slave)[(*n)++] = i;
+    PetscInt first = i, sides = 1;
+
+    if (!carries[i] || HycoMeshOwned(m, i) < 0 || Follows(m, i, carries)) continue;
+    if (each) HycoMasterSearchSides(t, i, HYCO_ONE_SIDE, &first, &sides);
+    for (PetscInt j = first; j < first + sides; j++) (*slave)[(*n)++] = j;
   }
   PetscCall(PetscFree(carries));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -226,11 +264,13 @@ PetscErrorCode HycoMasterSearchMatch(HycoContact c, HycoFE fe, PetscInt index, P
 {
   HycoMasterSearch t;
   HycoMatch m = {0};
-  PetscInt *slave;
+  PetscInt *slave, edges;
 
   PetscFunctionBegin;
-  PetscCall(HycoMasterSearchCreate(fe, c, nodes, &t));
-  PetscCall(FindSlaves(&t, &m.n, &slave));
+  PetscCall(HycoPairsEdges(fe, pairs, index, &edges));
+  PetscCall(HycoMasterSearchCreate(fe, c, nodes, edges, &t));
+  /* Where the scene gives a normal, a node that is only listed has one contact. */
+  PetscCall(FindSlaves(&t, (PetscBool)(settle || HycoContactAverages(c)), &m.n, &slave));
   m.slave = slave;
   HycoFinally(Match(&t, c, index, settle, remedy, &m, pairs), PetscCall(PetscFree(slave));
               PetscCall(HycoMasterSearchDestroy(&t)));

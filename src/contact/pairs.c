@@ -9,6 +9,7 @@ PetscErrorCode HycoPairsReserve(HycoPairs *p, PetscInt contacts, PetscInt width)
   PetscFunctionBegin;
   PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(PetscInt), &p->slave));
   PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(PetscInt), &p->contact));
+  PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(PetscInt), &p->side));
   PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(PetscInt), &p->master_start));
   if (!p->n) p->master_start[0] = 0;
   /* One more than needed: arrays of no contacts are not NULL. */
@@ -27,10 +28,11 @@ void HycoPairsAddMasters(HycoPairs *p, PetscInt n, const PetscInt node[], const 
 }
 
 /* The room must have been reserved. Masters' weights add up to 1. */
-void HycoPairsAppend(HycoPairs *p, PetscInt contact, PetscInt slave, PetscInt n, const PetscInt node[],
+void HycoPairsAppend(HycoPairs *p, PetscInt contact, PetscInt slave, PetscInt side, PetscInt n, const PetscInt node[],
                      const PetscReal weight[])
 {
   p->slave[p->n] = slave;
+  p->side[p->n] = side;
   p->contact[p->n++] = contact;
   p->master_start[p->n] = p->master_start[p->n - 1];
   HycoPairsAddMasters(p, n, node, weight);
@@ -40,8 +42,8 @@ void HycoPairsAppend(HycoPairs *p, PetscInt contact, PetscInt slave, PetscInt n,
 PetscErrorCode HycoPairsDestroy(HycoPairs *pairs)
 {
   PetscFunctionBegin;
-  HycoFreeAll(&pairs->slave, &pairs->contact, &pairs->master_start, &pairs->master, &pairs->weight, &pairs->search,
-              &pairs->number, &pairs->geometry);
+  HycoFreeAll(&pairs->slave, &pairs->contact, &pairs->side, &pairs->master_start, &pairs->master, &pairs->weight,
+              &pairs->search, &pairs->number, &pairs->geometry);
   pairs->n = pairs->room = pairs->place = pairs->drawn = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -62,7 +64,7 @@ PetscErrorCode HycoPairsSelect(const HycoPairs *all, PetscInt n, const PetscInt 
   for (PetscInt i = 0; i < n; i++) {
     const PetscInt k = which[i], lo = all->master_start[k];
 
-    HycoPairsAppend(out, all->contact[k], all->slave[k], all->master_start[k + 1] - lo, all->master + lo,
+    HycoPairsAppend(out, all->contact[k], all->slave[k], all->side[k], all->master_start[k + 1] - lo, all->master + lo,
                     all->weight + lo);
   }
   for (PetscInt i = 0; index && i < n; i++) out->slave[i] = index[out->slave[i]];

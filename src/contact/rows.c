@@ -107,7 +107,7 @@ static PetscErrorCode CheckSmooth(HycoFE fe, const HycoPairs *pairs, const Petsc
   PetscFunctionBegin;
   for (PetscInt k = 0; k < pairs->n; k++) {
     for (PetscInt j = before[k]; j >= 0; j = before[j]) {
-      if (!AreSmooth(fe, pairs, k, j, normal)) continue;
+      if (pairs->contact[j] == pairs->contact[k] || !AreSmooth(fe, pairs, k, j, normal)) continue;
       /* The first pair of contacts is named, and only its nodes are counted. */
       a = n ? a : pairs->contact[j];
       b = n ? b : pairs->contact[k];
@@ -143,7 +143,9 @@ static PetscErrorCode CheckCorners(HycoFE fe, const HycoPairs *pairs, const Pets
   }
   ierr = CheckSmooth(fe, pairs, before, normal);
   for (PetscInt k = 0; k < pairs->n && !ierr; k++) {
-    if (before[k] >= 0) ierr = CheckCorner(fe, pairs, k, before, normal);
+    /* The sides of one contact, which differ by more than 40 degrees, may act on the same free unknown. */
+    if (before[k] >= 0 && pairs->contact[before[k]] != pairs->contact[k])
+      ierr = CheckCorner(fe, pairs, k, before, normal);
   }
   PetscCall(PetscFree2(last, before));
   PetscCall(ierr);

@@ -3,30 +3,49 @@
 */
 #include "master_search.h"
 
-/* Verdict on a slave as drawn: met, turned away, too far, askew (its normal misses the master point), past the
-   border. Within `small` the direction is round-off and is not judged. */
-PetscErrorCode HycoMasterSearchJudge(HycoMasterSearch *t, PetscInt slave, PetscReal tolerance, PetscReal small,
-                                     HycoProjection *at, HycoVerdict *why)
+/* Whether the direction to a master point misses it: by its angle to the normal, or past the border. */
+static PetscErrorCode FindMiss(HycoMasterSearch *t, PetscInt slave, const HycoProjection *at, HycoVerdict *why)
 {
   const PetscReal *out = HycoMasterSearchOutward(t, slave);
   PetscReal r[3];
   PetscBool past = PETSC_FALSE;
 
   PetscFunctionBegin;
-  *why = HYCO_FOUND;
-  HycoMasterSearchProject(t, slave, PETSC_FALSE, at);
-  if (!at->n) {
-    *why = HYCO_TURNED;
-    HycoMasterSearchProject(t, slave, PETSC_TRUE, at);
-  }
-  /* Turned away is reported before the distance, because a larger tolerance would not help. */
-  if (*why == HYCO_FOUND && at->distance > tolerance) *why = HYCO_FAR;
-  if (*why != HYCO_FOUND || !out || at->distance <= small) PetscFunctionReturn(PETSC_SUCCESS);
   HycoMasterSearchAcross(t, slave, at, r);
   /* A normal that is farther than the limit angle from the direction to the master point. */
   if (PetscAbsReal(HycoDot(r, out)) < -HYCO_OPPOSED * at->distance) *why = HYCO_ASKEW;
   PetscCall(HycoMasterSearchIsPast(t, slave, at, &past));
   if (past) *why = HYCO_PAST;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Verdict on a slave as drawn: met, turned away, too far, askew (its normal misses the master point), past the
+   border. Within `small` the direction is round-off and is not judged. On a surface that goes round an edge, of which parts
+   face nothing by nature, only a slave in front of the master is too far. */
+PetscErrorCode HycoMasterSearchJudge(HycoMasterSearch *t, PetscInt slave, PetscReal tolerance, PetscReal small,
+                                     HycoProjection *at, HycoVerdict *why)
+{
+  HycoProjection nearest;
+  PetscBool far;
+
+  PetscFunctionBegin;
+  *why = HYCO_FOUND;
+  HycoMasterSearchProject(t, slave, PETSC_FALSE, at);
+  if (!at->n) {
+    /* Reported before the distance, because a larger tolerance would not help. */
+    *why = HYCO_TURNED;
+    HycoMasterSearchProject(t, slave, PETSC_TRUE, at);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  far = (PetscBool)(at->distance > tolerance);
+  if (HycoMasterSearchOutward(t, slave) && at->distance > small && (!far || (t->edges & HYCO_SLAVE_EDGE)))
+    PetscCall(FindMiss(t, slave, at, why));
+  if (!far || *why != HYCO_FOUND) PetscFunctionReturn(PETSC_SUCCESS);
+  *why = HYCO_FAR;
+  if (!t->edges) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Another part of the master is nearer. */
+  HycoMasterSearchProject(t, slave, PETSC_TRUE, &nearest);
+  if (nearest.patch != at->patch && at->distance > 2 * nearest.distance) *why = HYCO_TURNED;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -59,6 +78,39 @@ static PetscErrorCode AnswerAll(HycoMasterSearch *t, const HycoQuery *q, PetscIn
       PetscCall(Follow(t, slave[k], q->tolerance, &at[k]));
     else
       PetscCall(HycoMasterSearchJudge(t, slave[k], q->tolerance, q->small, &at[k], &why[k]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscInt RankOf(const HycoProjection *at, HycoVerdict why)
+{
+  if (why == HYCO_FOUND) return at->n ? 2 : 0;
+  return why == HYCO_FAR;
+}
+
+PetscBool HycoVerdictIsBetter(const HycoProjection *at, HycoVerdict why, const HycoProjection *best, HycoVerdict other)
+{
+  const PetscInt rank = RankOf(at, why), than = RankOf(best, other);
+
+  return (PetscBool)(rank > than || (rank == 2 && than == 2 && at->distance < best->distance));
+}
+
+/* Not logged: it is for one node. */
+PetscErrorCode HycoMasterSearchNearest(HycoMasterSearch *t, const HycoQuery *q, PetscInt node, PetscInt side,
+                                       HycoProjection *at, HycoVerdict *why)
+{
+  PetscInt first, n;
+
+  PetscFunctionBegin;
+  HycoMasterSearchSides(t, node, side, &first, &n);
+  for (PetscInt j = first; j < first + n; j++) {
+    HycoProjection here;
+    HycoVerdict verdict;
+
+    PetscCall(AnswerAll(t, q, 1, &j, &here, &verdict));
+    if (j > first && !HycoVerdictIsBetter(&here, verdict, at, *why)) continue;
+    *at = here;
+    *why = verdict;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -13,6 +13,12 @@
 /* Deviation of a plane due to the rounding of coordinates in a mesh file. */
 #define FLAT 1e-6
 
+/* Whether place k of the facets counts at its node. */
+static PetscBool Counts(HycoMesh m, const PetscInt side[], PetscInt k)
+{
+  return (PetscBool)(side[m->facets[k]] < 0 || m->facet_side[k] == side[m->facets[k]]);
+}
+
 /* The weight of the normal of a facet with nf corners at its corner v, from the next and the previous corner. */
 static PetscReal Weight(HycoFE fe, PetscInt nf, const PetscInt node[], PetscInt v)
 {
@@ -27,6 +33,7 @@ static PetscReal Weight(HycoFE fe, PetscInt nf, const PetscInt node[], PetscInt 
 }
 
 typedef struct {
+  const PetscInt *side;    /* n_nodes: of nodes on edges the side that counts; HYCO_ONE_SIDE: all facets */
   PetscReal *exact, *mean; /* n_nodes x 3: weighted by Max's weights, by areas */
   PetscReal *bend;         /* n_nodes: the largest angle between facets around the node */
   PetscInt *fan;           /* n_nodes: 0 if the facets form a closed ring around the node */
@@ -50,6 +57,7 @@ static PetscErrorCode AddFacets(HycoFE fe, PetscInt group, Surface *s)
     for (PetscInt v = 0; v < corners; v++) {
       const PetscReal weight = Weight(fe, corners, node, v);
 
+      if (!Counts(m, s->side, f * m->nf + v)) continue;
       for (PetscInt c = 0; c < 3; c++) {
         s->exact[3 * node[v] + c] += weight * unit[c];
         s->mean[3 * node[v] + c] += n[c];
@@ -86,7 +94,7 @@ static PetscErrorCode AddNodeNormals(HycoFE fe, PetscInt group, Surface *s)
   for (PetscInt k = 0; k < m->n_facets * m->nf; k++) {
     PetscReal n[3];
 
-    if (m->facet_group[k / m->nf] != group) continue;
+    if (m->facet_group[k / m->nf] != group || !Counts(m, s->side, k)) continue;
     PetscCall(NormalAt(fe, k / m->nf, k % m->nf, n));
     for (PetscInt c = 0; c < 3; c++) {
       s->exact[3 * m->facets[k] + c] += n[c];
@@ -107,7 +115,7 @@ static PetscErrorCode FindBends(HycoFE fe, PetscInt group, Surface *s, PetscReal
     const PetscInt i = m->facets[k];
     PetscReal n[3];
 
-    if (m->facet_group[k / m->nf] != group) continue;
+    if (m->facet_group[k / m->nf] != group || !Counts(m, s->side, k)) continue;
     PetscCall(NormalAt(fe, k / m->nf, k % m->nf, n));
     /* Twice the distance from the mean is about the largest angle between the facets. */
     s->bend[i] = PetscMax(s->bend[i], 2 * HycoDistance(n, s->mean + 3 * i));
@@ -121,8 +129,10 @@ static PetscErrorCode FindBends(HycoFE fe, PetscInt group, Surface *s, PetscReal
 
       if (bend < EDGE) most = PetscMax(most, bend);
     }
-    for (PetscInt v = 0; v < m->nf; v++)
-      wide[m->facets[f * m->nf + v]] = PetscMax(wide[m->facets[f * m->nf + v]], most);
+    for (PetscInt v = 0; v < m->nf; v++) {
+      if (Counts(m, s->side, f * m->nf + v))
+        wide[m->facets[f * m->nf + v]] = PetscMax(wide[m->facets[f * m->nf + v]], most);
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -131,12 +141,14 @@ static PetscErrorCode FindBends(HycoFE fe, PetscInt group, Surface *s, PetscReal
    angles between facets (bend). At a closed ring the error is of second order in the bend, at a border of first order.
    Not collective: all facets around the nodes must be in the mesh. These doubts decide which rigid motions of smooth
    surfaces contact does not resist. */
-PetscErrorCode HycoSmoothNormals(HycoFE fe, PetscInt group, PetscReal normal[], PetscReal doubt[], PetscReal bend[])
+PetscErrorCode HycoSmoothNormals(HycoFE fe, PetscInt group, const PetscInt side[], PetscReal normal[],
+                                 PetscReal doubt[], PetscReal bend[])
 {
   HycoMesh m = fe->mesh;
-  Surface s = {normal, NULL, NULL, NULL};
+  Surface s = {.side = side, .exact = normal};
 
   PetscFunctionBegin;
+  PetscCall(HycoSurfaceSides(fe->scene, m));
   PetscCall(PetscArrayzero(normal, 3 * m->n_nodes));
   PetscCall(PetscArrayzero(bend, m->n_nodes));
   PetscCall(PetscCalloc3(3 * m->n_nodes, &s.mean, m->n_nodes, &s.bend, m->n_nodes, &s.fan));

@@ -36,40 +36,89 @@ static void Relative(Shapes *s, const HycoMotions *motions)
   }
 }
 
-/* Normals of the slave's and the master's surface at one contact's pairs; work: room for 5 reals a node. The
-   master's normal is reversed and interpolated at the master point. */
-static PetscErrorCode SurfaceSenses(Shapes *s, PetscInt contact, PetscReal work[])
+/* How many contacts with i's slave come before it: those of other sides. */
+static PetscInt LayerOf(const HycoPairs *p, PetscInt i)
 {
-  HycoContact c = s->fe->scene->contact[contact];
+  PetscInt k = i;
+
+  while (k > 0 && p->slave[k - 1] == p->slave[i] && p->contact[k - 1] == p->contact[i]) k--;
+  return i - k;
+}
+
+static PetscInt WideNode(const Shapes *s, PetscInt node)
+{
+  return s->index ? s->index[node] : node;
+}
+
+/* The normals of a contact's slaves in one layer: at a slave with several contacts that of one of them. side, work: of the
+   nodes. */
+static PetscErrorCode SlaveSenses(Shapes *s, PetscInt contact, PetscInt layer, PetscInt side[], PetscReal work[],
+                                  PetscBool *more)
+{
   const HycoPairs *p = s->pairs;
   const PetscInt n_nodes = s->wide->mesh->n_nodes;
   PetscReal *normal = work, *doubt = work + 3 * n_nodes, *bend = work + 4 * n_nodes;
+  PetscInt g = 0;
 
   PetscFunctionBegin;
-  for (PetscInt side = SLAVE; side <= MASTER; side++) {
-    const char *group = side == SLAVE ? c->slave : c->master;
-    PetscInt g = 0;
+  *more = PETSC_FALSE;
+  for (PetscInt i = 0; i < n_nodes; i++) side[i] = HYCO_ONE_SIDE;
+  for (PetscInt i = 0; i < s->m; i++) {
+    if (p->contact[i] != contact) continue;
+    if (LayerOf(p, i) == layer) side[WideNode(s, p->slave[i])] = p->side[i];
+    *more = (PetscBool)(*more || LayerOf(p, i) > layer);
+  }
+  PetscCall(HycoMeshFindGroup(s->wide->mesh, "contact", s->fe->scene->contact[contact]->slave, &g));
+  PetscCall(HycoSmoothNormals(s->wide, g, side, normal, doubt, bend));
+  for (PetscInt i = 0; i < s->m; i++) {
+    const PetscInt node = WideNode(s, p->slave[i]);
 
-    /* An obstacle has no surface on its other side. */
-    if (!group) continue;
-    PetscCall(HycoMeshFindGroup(s->wide->mesh, "contact", group, &g));
-    PetscCall(HycoSmoothNormals(s->wide, g, normal, doubt, bend));
-    for (PetscInt i = 0; i < s->m; i++) {
-      const PetscInt lo = side == SLAVE ? 0 : p->master_start[i], hi = side == SLAVE ? 1 : p->master_start[i + 1];
+    if (p->contact[i] != contact || LayerOf(p, i) != layer) continue;
+    for (PetscInt d = 0; d < 3; d++) s->normal[SLAVE][3 * i + d] = normal[3 * node + d];
+    s->doubt[SLAVE][i] = doubt[node];
+    s->bend[SLAVE][i] = bend[node];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-      if (p->contact[i] != contact) continue;
-      for (PetscInt j = lo; j < hi; j++) {
-        /* Several masters: the normal at their mean point is interpolated by the weights of the gap. */
-        const PetscInt here = side == SLAVE ? p->slave[i] : p->master[j], node = s->index ? s->index[here] : here;
+/* The master's normals, reversed and interpolated at the master points of one contact's pairs. */
+static PetscErrorCode MasterSenses(Shapes *s, PetscInt contact, PetscInt side[], PetscReal work[])
+{
+  const char *group = s->fe->scene->contact[contact]->master;
+  const HycoPairs *p = s->pairs;
+  const PetscInt n_nodes = s->wide->mesh->n_nodes;
+  PetscReal *normal = work, *doubt = work + 3 * n_nodes, *bend = work + 4 * n_nodes;
+  PetscInt g = 0;
 
-        for (PetscInt d = 0; d < 3; d++)
-          s->normal[side][3 * i + d] += side == SLAVE ? normal[3 * node + d] : -p->weight[j] * normal[3 * node + d];
-        /* The most doubtful of the nodes that enter. */
-        s->doubt[side][i] = PetscMax(s->doubt[side][i], doubt[node]);
-        s->bend[side][i] = PetscMax(s->bend[side][i], bend[node]);
-      }
+  PetscFunctionBegin;
+  /* An obstacle has no surface on its other side. */
+  if (!group) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = 0; i < n_nodes; i++) side[i] = HYCO_ONE_SIDE;
+  PetscCall(HycoMeshFindGroup(s->wide->mesh, "contact", group, &g));
+  PetscCall(HycoSmoothNormals(s->wide, g, side, normal, doubt, bend));
+  for (PetscInt i = 0; i < s->m; i++) {
+    if (p->contact[i] != contact) continue;
+    for (PetscInt j = p->master_start[i]; j < p->master_start[i + 1]; j++) {
+      const PetscInt node = WideNode(s, p->master[j]);
+
+      /* Several masters: the normal at their mean point is interpolated by the weights of the gap. */
+      for (PetscInt d = 0; d < 3; d++) s->normal[MASTER][3 * i + d] -= p->weight[j] * normal[3 * node + d];
+      /* The most doubtful of the nodes that enter. */
+      s->doubt[MASTER][i] = PetscMax(s->doubt[MASTER][i], doubt[node]);
+      s->bend[MASTER][i] = PetscMax(s->bend[MASTER][i], bend[node]);
     }
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Normals of the slave's and the master's surface at one contact's pairs; work: room for 5 reals a node. */
+static PetscErrorCode SurfaceSenses(Shapes *s, PetscInt contact, PetscInt side[], PetscReal work[])
+{
+  PetscBool more = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  for (PetscInt layer = 0; more; layer++) PetscCall(SlaveSenses(s, contact, layer, side, work, &more));
+  PetscCall(MasterSenses(s, contact, side, work));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -79,11 +128,12 @@ static PetscErrorCode FindSenses(Shapes *s)
 {
   HycoScene scene = s->fe->scene;
   PetscReal *work, *gap;
+  PetscInt *side;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(5 * s->wide->mesh->n_nodes, &work, s->m, &gap));
+  PetscCall(PetscMalloc3(5 * s->wide->mesh->n_nodes, &work, s->m, &gap, s->wide->mesh->n_nodes, &side));
   PetscCall(HycoContactGeometry(s->fe, s->pairs, s->normal[GIVEN], gap));
-  for (PetscInt c = 0; c < scene->n_contacts && s->fe->dim > 1; c++) PetscCall(SurfaceSenses(s, c, work));
+  for (PetscInt c = 0; c < scene->n_contacts && s->fe->dim > 1; c++) PetscCall(SurfaceSenses(s, c, side, work));
   for (PetscInt i = 0; i < s->m; i++) {
     const PetscReal *n = s->normal[SLAVE] + 3 * i;
     const PetscBool given = (PetscBool)!HycoContactAverages(scene->contact[s->pairs->contact[i]]);
@@ -94,7 +144,7 @@ static PetscErrorCode FindSenses(Shapes *s)
     for (PetscInt d = 0; d < 3 && !given && n[0] * n[0] + n[1] * n[1] + n[2] * n[2] > 0; d++)
       s->normal[GIVEN][3 * i + d] = 0;
   }
-  PetscCall(PetscFree2(work, gap));
+  PetscCall(PetscFree3(work, gap, side));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -103,6 +153,8 @@ static PetscErrorCode FindAllSenses(Shapes *s)
 {
   PetscFunctionBegin;
   HycoOnEach(s->comm, FindSenses(s));
+  /* A normal along its surface resists nothing: it is named, not the motion that follows from it. */
+  PetscCall(HycoContactCheckNormals(s->comm, s->fe, s->pairs, s->normal[GIVEN]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -276,7 +276,7 @@ static PetscErrorCode MoveNodes(HycoFE fe, PetscBool first, const PetscBool chan
 }
 
 /* In an axisymmetric scene: whether the mesh file has the node on the axis, where its radial displacement is 0. */
-static PetscBool OnAxis(HycoFE fe, PetscInt node)
+PetscBool HycoNodeIsOnAxis(HycoFE fe, PetscInt node)
 {
   return (PetscBool)(fe->formulation == HYCO_AXISYMMETRIC &&
                      PetscAbsReal(fe->mesh->xyz[3 * node]) <= 1e-9 * HycoMeshLength(fe->mesh));
@@ -286,7 +286,7 @@ static PetscBool OnAxis(HycoFE fe, PetscInt node)
    that they carry no contact. */
 PetscBool HycoNodeHasNoArea(HycoFE fe, PetscInt node)
 {
-  return (PetscBool)(HycoMeshIsQuadratic(fe->mesh) && OnAxis(fe, node));
+  return (PetscBool)(HycoMeshIsQuadratic(fe->mesh) && HycoNodeIsOnAxis(fe, node));
 }
 
 /* In an axisymmetric scene: checks that no node crosses the axis, and that those on it stay there. */
@@ -302,7 +302,7 @@ static PetscErrorCode CheckAxis(HycoFE fe)
     HycoCheck(r >= -zero, "node %d lies at x = %g; an axisymmetric scene must be drawn at x >= 0",
               (int)fe->mesh->node_id[i], (double)r);
     /* Nodes on the axis have no radial unknown: which nodes these are must not depend on a parameter. */
-    HycoCheck((r <= zero) == OnAxis(fe, i),
+    HycoCheck((r <= zero) == HycoNodeIsOnAxis(fe, i),
               "the map of body %s moves node %d from x = %g to x = %g; in an axisymmetric scene nodes on the axis x = "
               "0 must stay there, and other nodes must stay off it",
               fe->scene->body[fe->mesh->node_body[i]].name, (int)fe->mesh->node_id[i], (double)fe->mesh->xyz[3 * i],
@@ -368,7 +368,7 @@ static PetscErrorCode SetSupports(HycoFE fe)
   PetscCall(PetscArrayzero(fe->fixed, fe->n_dof));
   PetscCall(PetscArrayzero(fe->u0, fe->n_dof));
   fe->lifted = PETSC_FALSE;
-  for (PetscInt i = 0; i < m->n_nodes; i++) fe->fixed[i * m->dim] = OnAxis(fe, i);
+  for (PetscInt i = 0; i < m->n_nodes; i++) fe->fixed[i * m->dim] = HycoNodeIsOnAxis(fe, i);
   for (PetscInt k = 0; k < fe->scene->n_fixed; k++) {
     HycoFixed *fixed = &fe->scene->fixed[k];
     PetscReal value = 0;

@@ -77,7 +77,7 @@ static PetscErrorCode FetchSurface(HycoFOM f, HycoMesh *surface)
 /* A contact as it is sent: nodes by their numbers in the distributed vectors. One with more masters than a facet has
    nodes is sent in several pieces, of which all but the first say `more`. */
 typedef struct {
-  PetscInt contact, slave, number, more, n, master[HYCO_FACET_NODES];
+  PetscInt contact, slave, side, number, more, n, master[HYCO_FACET_NODES];
   PetscReal weight[HYCO_FACET_NODES];
 } Sent;
 
@@ -103,6 +103,7 @@ static PetscErrorCode PackContacts(HycoMesh m, const HycoPairs *p, PetscInt *n, 
 
       s->contact = p->contact[k];
       s->slave = m->node_global[p->slave[k]];
+      s->side = p->side[k];
       /* The number of the contact in the order of one rank. */
       s->number = p->number ? p->number[k] : k;
       /* A mortar row has more masters than a facet: it travels in several pieces of one size. */
@@ -160,7 +161,8 @@ static PetscErrorCode UnpackContacts(HycoMesh m, PetscInt n, const Sent sent[], 
     if (sent[k].more)
       HycoPairsAddMasters(p, sent[k].n, master, sent[k].weight);
     else
-      HycoPairsAppend(p, sent[k].contact, PlaceOf(&places, sent[k].slave), sent[k].n, master, sent[k].weight);
+      HycoPairsAppend(p, sent[k].contact, PlaceOf(&places, sent[k].slave), sent[k].side, sent[k].n, master,
+                      sent[k].weight);
   }
   PetscCall(PetscFree2(places.global, places.node));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -288,8 +290,7 @@ static PetscErrorCode FindOnRoot(HycoFOM f, const HycoSurfaceFacts facts[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The numbers of the contacts in the order of the scene's contacts, then of the slaves' tags. Keys of contact and
-   node: the numbers do not depend on the partition. */
+/* The numbers of the contacts in the order of the scene's contacts, then of the slaves' tags and sides. Keys of these: the numbers do not depend on the partition. */
 static PetscErrorCode NumberContacts(HycoFOM f)
 {
   HycoPairs *p = &f->pairs;
@@ -300,8 +301,10 @@ static PetscErrorCode NumberContacts(HycoFOM f)
   PetscCall(PetscFree(p->number));
   PetscCall(PetscMalloc1(p->n + 1, &p->number));
   /* 64 bits: contacts times nodes exceed an int. */
-  for (PetscInt k = 0; k < p->n; k++)
+  for (PetscInt k = 0; k < p->n; k++) {
     key[k] = (PetscInt64)p->contact[k] * f->part->n_whole_nodes + f->surface->node_whole[p->slave[k]];
+    key[k] = (HYCO_SIDES + 1) * key[k] + p->side[k] + 1; /* HYCO_ONE_SIDE: 0 */
+  }
   PetscCall(HycoRankKeys(HycoComm(f), p->n, key, p->number, &f->n_contacts));
   PetscCall(PetscFree(key));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -394,6 +394,23 @@ static PetscErrorCode FindMasters(HycoFOM f, PetscBool *wider)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Given normals that lead into the slave's body, where the scene gives any. */
+static PetscErrorCode CheckNormals(HycoFOM f)
+{
+  PetscReal *normal, *gap;
+  PetscBool any = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  for (PetscInt c = 0; c < f->scene->n_contacts; c++)
+    any = (PetscBool)(any || !HycoContactAverages(f->scene->contact[c]));
+  if (!any || f->n_turned) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc2(3 * f->pairs.n, &normal, f->pairs.n, &gap));
+  HycoOnEach(HycoComm(f), HycoContactGeometry(f->fe_surface, &f->pairs, normal, gap));
+  HycoFinally(HycoContactCheckNormals(HycoComm(f), f->fe_surface, &f->pairs, normal),
+              PetscCall(PetscFree2(normal, gap)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* B and B^T (explicit, since PETSc's products with a parallel transpose are slower) and D. Collective. */
 static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
 {
@@ -411,6 +428,7 @@ static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
   } else if (f->n_contacts && rows_changed && f->Bt)
     PetscCall(MatZeroEntries(f->B));
   ierr = AllRows(f, &r); /* without contacts there may be obstacles whose nodes are all fixed */
+  if (!ierr && f->n_contacts) ierr = CheckNormals(f);
   if (!ierr && f->n_contacts) ierr = Insert(f, rows_changed, &r);
   PetscCall(HycoRowsDestroy(&r));
   PetscCall(ierr);

@@ -133,6 +133,7 @@ PetscErrorCode HycoInspectGaps(HycoInspection *in, HycoFE fe, PetscBool first)
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(3 * p->n, &normal, p->n, &gap, s->n_contacts, &share));
   PetscCall(HycoContactGeometry(fe, p, normal, gap));
+  PetscCall(HycoContactCheckNormals(PETSC_COMM_SELF, fe, p, normal));
   PetscCall(HycoContactBuried(PETSC_COMM_SELF, fe, fe, p, gap, share));
   for (PetscInt c = 0; c < s->n_contacts; c++) {
     HycoContactInspection *r = &in->contact[c];

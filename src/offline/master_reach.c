@@ -271,7 +271,7 @@ static PetscErrorCode Collect(const Surfaces *s, const HycoPairs *pairs, const L
 
     HycoPairsMasters(pairs, k, &n, &master, &weight);
     if (!moved) met->of[out->n] = k;
-    if (!moved) HycoPairsAppend(out, pairs->contact[k], pairs->slave[k], n, master, weight);
+    if (!moved) HycoPairsAppend(out, pairs->contact[k], pairs->slave[k], pairs->side[k], n, master, weight);
     for (PetscInt r = moved ? l->head[at] : -1; r >= 0; r = l->row[r].next) {
       for (PetscInt a = 0; a < l->row[r].n; a++) {
         node[a] = s->node[l->node[l->row[r].first + a]];
@@ -279,7 +279,7 @@ static PetscErrorCode Collect(const Surfaces *s, const HycoPairs *pairs, const L
         shares[a] = 1 / (PetscReal)l->row[r].n;
       }
       met->of[out->n] = k;
-      HycoPairsAppend(out, pairs->contact[k], pairs->slave[k], l->row[r].n, node, shares);
+      HycoPairsAppend(out, pairs->contact[k], pairs->slave[k], pairs->side[k], l->row[r].n, node, shares);
     }
     at += moved;
   }

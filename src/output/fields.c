@@ -135,7 +135,7 @@ static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < fe->mesh->n_nodes; i++) f->gap_node[i] = f->which[i] = NAN;
   PetscCall(HycoContactGeometry(fe, pairs, f->normal, f->gap));
-  PetscCall(HycoContactAreas(fe, pairs, f->area));
+  PetscCall(HycoContactAreas(fe, pairs, f->normal, f->area));
   for (PetscInt k = 0; k < pairs->n; k++) {
     const PetscInt s = HycoPairsSlave(pairs, k), *master;
     const PetscReal *weight;

@@ -54,7 +54,7 @@ static PetscErrorCode Bring(HycoROM m, HycoFE fe)
   /* Until all three arrays belong to mu. */
   c->ready = PETSC_FALSE;
   PetscCall(HycoContactGeometry(fe, &m->pairs, c->normal, c->gap));
-  PetscCall(HycoContactAreas(fe, &m->pairs, c->area));
+  PetscCall(HycoContactAreas(fe, &m->pairs, c->normal, c->area));
   PetscCall(PetscArraycpy(c->mu, fe->mu, m->model->scene->n_variables));
   c->ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);

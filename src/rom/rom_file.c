@@ -42,6 +42,22 @@ static PetscErrorCode MoveTies(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Written where a surface goes round an edge: a model without them has none. */
+static PetscErrorCode MoveSides(HycoH5 h, HycoPairs *p)
+{
+  static const char name[] = "problem/pairs/side";
+  PetscBool any = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  if (HycoH5Reads(h) && !HycoH5Has(h, name)) PetscCall(PetscMalloc1(p->n + 1, &p->side));
+  for (PetscInt k = 0; k < p->n && p->side; k++) {
+    if (HycoH5Reads(h)) p->side[k] = HYCO_ONE_SIDE;
+    any = (PetscBool)(any || p->side[k] != HYCO_ONE_SIDE);
+  }
+  if (HycoH5Reads(h) ? !p->side : any) PetscCall(HycoH5Int(h, name, HYCO_ONE_SIDE, HYCO_SIDES - 1, &p->n, 1, &p->side));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Number of contacts and of entries follow from the file when it is read: -1 means "not known yet". */
 static PetscErrorCode MovePairs(HycoH5 h, PetscInt n_nodes, PetscInt n_contacts, HycoPairs *p)
 {
@@ -51,6 +67,7 @@ static PetscErrorCode MovePairs(HycoH5 h, PetscInt n_nodes, PetscInt n_contacts,
   if (HycoH5Reads(h)) p->n = -1;
   PetscCall(HycoH5Int(h, "problem/pairs/slave", 0, n_nodes - 1, &p->n, 1, &p->slave));
   PetscCall(HycoH5Int(h, "problem/pairs/contact", 0, n_contacts - 1, &p->n, 1, &p->contact));
+  PetscCall(MoveSides(h, p));
   PetscCall(HycoH5Starts(h, "problem/pairs/master_start", p->n, &p->master_start));
   /* Masters of all contacts in one array (CSR), whose length is known after the starts. */
   entries = &p->master_start[p->n];

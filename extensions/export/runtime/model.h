@@ -35,7 +35,7 @@ typedef struct {
 
 /* The contacts first .. first + n - 1: the nodes of a surface with their masters on another. */
 typedef struct {
-  PetscInt slave, master, first, n;
+  PetscInt slave, master, first, n, edges; /* edges: as of HycoMasterSearch */
 } Facing;
 
 /* n_nodes 0: no surface moves. */

@@ -91,6 +91,7 @@ static int meet(const Surfaces *s, const Facing *h, const Room *r, const double 
   t.node = (PetscInt *)node; /* which a search only reads, like the border */
   t.normal = r->normal;
   t.outward = r->outward;
+  t.edges = h->edges;
   t.n_border = master->n_border;
   t.border = (PetscInt *)s->border + master->border;
   t.at_border = (PetscBool *)s->at_border + master->at_border;

@@ -48,18 +48,86 @@ static PetscErrorCode CheckFacing(HycoContact c, HycoFE fe, const HycoPairs *p, 
            c->slave, c->master, stated >= 0 ? "larger " : "", c->name, c->master);
 }
 
+/* Whether a contact without a master is left out: one of several sides of its node of which another one has a master, or
+   on a surface that goes round an edge a node that does not look at the master. */
+static PetscErrorCode IsDropped(HycoMasterSearch *t, const HycoQuery *query, const HycoPairs *p, PetscInt first,
+                                PetscInt k, PetscBool *dropped)
+{
+  HycoProjection at;
+  HycoVerdict why;
+
+  PetscFunctionBegin;
+  *dropped = PETSC_FALSE;
+  if (p->master_start[k + 1] > p->master_start[k]) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt j = PetscMax(k - HYCO_SIDES, first); j < PetscMin(k + HYCO_SIDES, p->n); j++)
+    *dropped = (PetscBool)(*dropped || (p->slave[j] == p->slave[k] && p->master_start[j + 1] > p->master_start[j]));
+  if (*dropped || !(t->edges & HYCO_SLAVE_EDGE)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoMasterSearchReady(t));
+  PetscCall(HycoMasterSearchNearest(t, query, p->slave[k], p->side[k], &at, &why));
+  *dropped = (PetscBool)(why != HYCO_FOUND && why != HYCO_FAR);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Leaves these out, from contact `first` on. */
+static PetscErrorCode DropAlone(HycoMasterSearch *t, PetscReal tolerance, PetscInt first, HycoPairs *p)
+{
+  const HycoQuery query = {.tolerance = tolerance, .small = tolerance};
+  PetscInt *which, n = 0;
+  HycoPairs kept;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(p->n, &which));
+  for (PetscInt k = 0; k < p->n; k++) {
+    PetscBool dropped = PETSC_FALSE;
+
+    if (k >= first) PetscCall(IsDropped(t, &query, p, first, k, &dropped));
+    if (!dropped) which[n++] = k;
+  }
+  if (n < p->n) {
+    PetscCall(HycoPairsSelect(p, n, which, NULL, &kept));
+    PetscCall(HycoPairsDestroy(p));
+    *p = kept;
+  }
+  PetscCall(PetscFree(which));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fails if no node of the whole surface is left. */
+static PetscErrorCode FindDrawn(HycoContact c, HycoFE fe, PetscInt index, PetscInt first, PetscReal tolerance,
+                                HycoPairs *pairs)
+{
+  HycoMasterSearch t;
+  HycoPairs listed;
+  PetscInt *which, edges;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(pairs->n - first, &which));
+  for (PetscInt k = first; k < pairs->n; k++) which[k - first] = k;
+  PetscCall(HycoPairsSelect(pairs, pairs->n - first, which, NULL, &listed));
+  PetscCall(PetscFree(which));
+  pairs->n = first;
+  pairs->queries += listed.n;
+  HycoFinally(HycoMortarRows(c, fe, &listed, 0, listed.n, tolerance, pairs), PetscCall(HycoPairsDestroy(&listed)));
+  PetscCall(HycoPairsEdges(fe, pairs, index, &edges));
+  PetscCall(HycoMasterSearchCreate(fe, c, PETSC_FALSE, edges, &t));
+  HycoFinally(DropAlone(&t, tolerance, first, pairs), PetscCall(HycoMasterSearchDestroy(&t)));
+  HycoCheck(pairs->n > first || pairs->facts,
+            "contact %s: no node of %s faces %s within %g; check that these are the "
+            "surfaces in contact",
+            c->name, c->slave, c->master, (double)tolerance);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* On surfaces that a map moves only the slaves are listed. */
 static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs *pairs)
 {
   const PetscInt first = pairs->n;
   PetscReal tolerance;
-  PetscInt n, *slave;
 
   PetscFunctionBegin;
   PetscCall(CheckSupported(c, fe));
   PetscCall(HycoMasterSearchMatch(c, fe, index, PETSC_FALSE, NULL, NULL, pairs));
-  n = pairs->n - first;
-  if (!n || HycoPairsFollows(pairs, index)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (pairs->n == first || HycoPairsFollows(pairs, index)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoContactGetLength(c, "tolerance", &tolerance));
   if (tolerance < 0) {
     PetscInt g = 0;
@@ -67,19 +135,24 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
     PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &g));
     tolerance = pairs->facts ? pairs->facts[index].small : HycoSurfaceTolerance(fe->mesh, g);
   }
-  /* A copy: appending reallocates pairs->slave, of which these are the last n. */
-  HycoDuplicate(n, pairs->slave + first, &slave);
-  pairs->n = first;
-  pairs->queries += n;
-  HycoFinally(HycoMortarRows(c, fe, index, tolerance, n, slave, pairs), PetscCall(PetscFree(slave)));
+  PetscCall(FindDrawn(c, fe, index, first, tolerance, pairs));
   PetscCall(CheckFacing(c, fe, pairs, first, tolerance));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* At moved nodes. */
+static PetscErrorCode Find(HycoContact c, HycoFE fe, const HycoPairs *of, PetscInt first, PetscInt last,
+                           HycoPairs *found)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoMortarRows(c, fe, of, first, last, of->search[of->contact[first]].reach, found));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* At moved nodes a slave without facing facets has no masters, and no error: it may come back. integrated: gaps are sums over many nodes, so that touching surfaces need a threshold for zero. */
 PetscErrorCode HycoContactCreate_Mortar(HycoContact contact)
 {
-  static const struct _HycoContactOps ops = {.setup = SetUp, .find = HycoMortarRows};
+  static const struct _HycoContactOps ops = {.setup = SetUp, .find = Find};
 
   PetscFunctionBegin;
   PetscCall(HycoMasterSearchDeclare(contact));

@@ -6,19 +6,22 @@
 #define HYCO_APART_SHARE 0.5
 
 /* Whether each slave node (except those that need none) has its own master at most `far` away. */
-static PetscErrorCode AreMatched(HycoMesh m, PetscInt n, const HycoProjection at[], const PetscBool *needs,
-                                 PetscReal far, PetscBool *matched)
+static PetscErrorCode AreMatched(const HycoMasterSearch *t, const HycoMatch *m, const HycoProjection at[],
+                                 const PetscBool *needs, PetscReal far, PetscBool *matched)
 {
-  PetscBool *taken;
+  PetscInt *taken;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(m->n_nodes, &taken));
+  PetscCall(PetscCalloc1(t->n_nodes, &taken));
   *matched = PETSC_TRUE;
-  /* Two slaves with one master would share its unknowns. */
-  for (PetscInt k = 0; k < n && *matched; k++) {
+  /* Two slaves with one master would share its unknowns; the sides of one slave may. */
+  for (PetscInt k = 0; k < m->n && *matched; k++) {
+    const PetscInt own = HycoMasterSearchNode(t, m->slave[k]) + 1;
+
     if (!at[k].n && needs && !needs[k]) continue;
-    *matched = (PetscBool)(at[k].n == 1 && at[k].distance <= far && !taken[at[k].node[0]]);
-    if (*matched) taken[at[k].node[0]] = PETSC_TRUE;
+    *matched =
+        (PetscBool)(at[k].n == 1 && at[k].distance <= far && (!taken[at[k].node[0]] || taken[at[k].node[0]] == own));
+    if (*matched) taken[at[k].node[0]] = own;
   }
   PetscCall(PetscFree(taken));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -57,7 +60,7 @@ static PetscErrorCode MatchAlong(HycoMasterSearch *t, HycoContact c, HycoMatch *
     /* Nodes whose nearest facet faces away need no partner: they are on a side that the contact does not meet. */
     needs[k] = (PetscBool)(!out || HycoDot(out, t->normal + 3 * nearest.patch) <= HYCO_OPPOSED);
   }
-  PetscCall(AreMatched(t->fe->mesh, m->n, along, needs, Farthest(stated, m), &matched));
+  PetscCall(AreMatched(t, m, along, needs, Farthest(stated, m), &matched));
   for (PetscInt k = 0; matched && k < m->n; k++) {
     const PetscReal *out = HycoMasterSearchOutward(t, m->slave[k]);
 
@@ -77,27 +80,28 @@ static const char *ForOthers(HycoMesh m)
 }
 
 /* Checks that each master has one slave. A master with two slaves would make rows of B dependent up to round-off. */
-static PetscErrorCode CheckMasters(HycoMesh m, HycoContact c, const HycoMatch *match)
+static PetscErrorCode CheckMasters(const HycoMasterSearch *t, HycoContact c, const HycoMatch *match)
 {
+  HycoMesh m = t->fe->mesh;
   PetscInt *partner_of;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(m->n_nodes, &partner_of));
   for (PetscInt i = 0; i < m->n_nodes; i++) partner_of[i] = -1;
   for (PetscInt k = 0; k < match->n; k++) {
-    const PetscInt j = match->at[k].node[0];
+    const PetscInt j = match->at[k].node[0], own = HycoMasterSearchNode(t, match->slave[k]);
 
     if ((match->why[k] != HYCO_FOUND && match->why[k] != HYCO_ASKEW) || !match->at[k].n) continue;
-    if (partner_of[j] >= 0) {
+    if (partner_of[j] >= 0 && partner_of[j] != own) {
       const PetscInt other = partner_of[j];
 
       /* Before the error, which does not return here. */
       PetscCall(PetscFree(partner_of));
       HycoFail("contact %s: nodes %d and %d of %s are both nearest to node %d of %s; use matching meshes, or type: %s",
-               c->name, (int)m->node_id[other], (int)m->node_id[match->slave[k]], c->slave, (int)m->node_id[j],
-               c->master, ForOthers(m));
+               c->name, (int)m->node_id[other], (int)m->node_id[own], c->slave, (int)m->node_id[j], c->master,
+               ForOthers(m));
     }
-    partner_of[j] = match->slave[k];
+    partner_of[j] = own;
   }
   PetscCall(PetscFree(partner_of));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -110,12 +114,12 @@ static PetscErrorCode Settle(HycoMasterSearch *t, HycoContact c, HycoMatch *m)
   PetscBool matched;
 
   PetscFunctionBegin;
-  PetscCall(AreMatched(t->fe->mesh, m->n, m->at, NULL, PetscMin(m->small, m->tolerance), &matched));
+  PetscCall(AreMatched(t, m, m->at, NULL, PetscMin(m->small, m->tolerance), &matched));
   for (PetscInt k = 0; k < m->n; k++) matched = (PetscBool)(matched && m->why[k] == HYCO_FOUND);
   /* A rank's part cannot be matched along normals: one-to-one is a property of the whole surfaces. */
   HycoCheck(matched || !m->part, "contact %s: its nodes are not matched as drawn", c->name);
   if (!matched) PetscCall(MatchAlong(t, c, m));
-  PetscCall(CheckMasters(t->fe->mesh, c, m));
+  PetscCall(CheckMasters(t, c, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -9,8 +9,8 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
 {
   HycoMesh m = fe->mesh;
   const PetscReal one = 1;
-  PetscBool *carries, shared = PETSC_FALSE;
-  PetscInt g = 0, body;
+  PetscBool shared = PETSC_FALSE;
+  PetscInt g = 0, body, n, *slave, *side;
 
   PetscFunctionBegin;
   PetscCall(HycoMeshFindGroup(m, "contact", c->master, &g));
@@ -23,14 +23,12 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
   /* Of the contact's own group, and by its number in this mesh: each rank with slaves has a copy of the node. */
   body = m->group_node[m->group_start[g]];
   PetscCall(HycoMeshFindGroup(m, "contact", c->slave, &g));
-  PetscCall(HycoPairsReserve(pairs, m->group_start[g + 1] - m->group_start[g], 1));
-  PetscCall(PetscMalloc1(m->n_nodes, &carries));
-  HycoSurfaceCarriers(m, g, carries);
-  for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) {
-    if (m->group_node[k] == body) shared = PETSC_TRUE;
-    if (carries[m->group_node[k]]) HycoPairsAppend(pairs, index, m->group_node[k], 1, &body, &one);
-  }
-  PetscCall(PetscFree(carries));
+  PetscCall(HycoContactSlaves(fe, pairs, index, &n, &slave, &side));
+  PetscCall(HycoPairsReserve(pairs, n, 1));
+  for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++)
+    shared = (PetscBool)(shared || m->group_node[k] == body);
+  for (PetscInt k = 0; k < n; k++) HycoPairsAppend(pairs, index, slave[k], side[k], 1, &body, &one);
+  HycoFreeAll(&slave, &side);
   HycoCheck(!shared, "contact %s: its slave %s has the node that the rigid body moves with (%s); leave it out", c->name,
             c->slave, c->master);
   PetscFunctionReturn(PETSC_SUCCESS);

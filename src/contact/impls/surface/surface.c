@@ -3,6 +3,7 @@
   the projection is computed on the moved nodes: a slave node has a master if the nearest point's normal opposes its
   own, that point is within reach, and the node is not past the master's border.
 */
+#include "../../facing.h"
 #include "../../master_search.h"
 
 /* If the scene gives a largest distance of masters, a node that faces none within it has no contact. */
@@ -58,27 +59,44 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All n slaves of a moved contact in one tree; reach limits the distance. */
-static PetscErrorCode Find(HycoContact c, HycoFE fe, PetscInt index, PetscReal reach, PetscInt n,
-                           const PetscInt slave[], HycoPairs *found)
+/* The contacts first .. last - 1 of a moved surface in one tree, in their order, also without a master (n = 0): sizes stay
+   the same at every parameter. */
+static PetscErrorCode FindIn(HycoMasterSearch *t, const HycoPairs *of, PetscInt first, PetscInt last, HycoPairs *found)
 {
-  const HycoQuery query = {.moved = PETSC_TRUE, .tolerance = reach};
-  HycoMasterSearch t;
-  HycoProjection *at;
-  HycoVerdict *why;
-  PetscErrorCode ierr;
+  const PetscInt index = of->contact[first];
+  const HycoQuery query = {.moved = PETSC_TRUE, .tolerance = of->search[index].reach};
 
   PetscFunctionBegin;
-  PetscCall(HycoMasterSearchCreate(fe, c, PETSC_FALSE, &t));
-  PetscCall(PetscMalloc2(n, &at, n, &why));
-  ierr = HycoMasterSearchFind(&t, &query, n, slave, at, why);
   /* A facet has at most nf nodes: the width of a projection. */
-  PetscCall(HycoPairsReserve(found, n, fe->mesh->nf));
-  /* In the order of the slaves, also without a master (n = 0): sizes stay the same at every parameter. */
-  for (PetscInt k = 0; k < n && !ierr; k++) HycoPairsAppend(found, index, slave[k], at[k].n, at[k].node, at[k].weight);
-  PetscCall(PetscFree2(at, why));
-  PetscCall(HycoMasterSearchDestroy(&t));
-  PetscCall(ierr);
+  PetscCall(HycoPairsReserve(found, last - first, t->nf));
+  for (PetscInt k = first; k < last; k++) {
+    HycoProjection at;
+    HycoVerdict why;
+
+    PetscCall(HycoMasterSearchNearest(t, &query, of->slave[k], of->side[k], &at, &why));
+    HycoPairsAppend(found, index, of->slave[k], of->side[k], at.n, at.node, at.weight);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Logged as a whole. */
+static PetscErrorCode FindAll(HycoMasterSearch *t, const HycoPairs *of, PetscInt first, PetscInt last, HycoPairs *found)
+{
+  PetscFunctionBegin;
+  HycoLogged(HYCO_EVENT_SEARCH, FindIn(t, of, first, last, found));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Find(HycoContact c, HycoFE fe, const HycoPairs *of, PetscInt first, PetscInt last,
+                           HycoPairs *found)
+{
+  HycoMasterSearch t;
+  PetscInt edges;
+
+  PetscFunctionBegin;
+  PetscCall(HycoPairsEdges(fe, of, of->contact[first], &edges));
+  PetscCall(HycoMasterSearchCreate(fe, c, PETSC_FALSE, edges, &t));
+  HycoFinally(FindAll(&t, of, first, last, found), PetscCall(HycoMasterSearchDestroy(&t)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,0 +1,75 @@
+"""Slave groups that go round an edge: the whole skin of a body is, as a slave, the part of it that faces the master; a block in a corner has a contact on each side."""
+import os
+import sys
+import unittest
+
+import numpy as np
+
+from common import SOURCE, Case
+
+sys.path.insert(0, os.path.join(SOURCE, 'tests', 'verify'))
+from grids import Grid  # noqa: E402
+
+COLUMNS = """
+scene: {mesh: mesh.msh%s}
+body: {low: {young: 1000}, up: {young: 700}}
+fixed: {low_y0: {%s}, hold: {%s}}
+pressure: {up_y1: 1}
+contact: {c: {type: %s, slave: skin, master: low_y1, tolerance: 0.05%s}}
+output: {along: {force: x, contact: c}, peak: {max: contact_pressure, contact: c}, touch: {area: closed, contact: c}, low: {min: sigma_yy, group: up}, high: {max: sigma_yy, group: up}}
+"""
+
+
+class Edges(Case):
+    def columns(self, kind, n, m, skin=True):
+        """A column on another, of n and m cells along them; with `skin` the whole boundary of the upper one, else its underside, is the group skin."""
+        dim = 3 if kind in ('hex8', 'tet4') else 2
+        grid, names = Grid(), [f'{a}{e}' for a in 'xyz'[:dim] for e in '01']
+        for body, cells, y in (('low', m, 0), ('up', n, 1)):
+            axes = [np.linspace(0, 1, cells + 1)] * dim
+            faces = {name: f'{body}_{name}' for name in names}
+            start = len(grid.elements)
+            grid.box(kind, axes, lambda x, y=y: x + np.eye(dim)[1] * y, body, faces)
+            tags = {grid._tag(f'{body}_{name}', dim - 1) for name in (names if skin else ['y0'])}
+            if body == 'up':
+                grid.elements += [(t, grid._tag('skin', dim - 1), e) for t, tag, e in grid.elements[start:] if tag in tags]
+                hold = [f'up_{a}0' for a in 'xyz'[:dim] if a != 'y']
+        grid.write(self.path('mesh.msh'))
+        return dim, hold
+
+    def test_patch(self):
+        """A uniform pressure on a column of Poisson's ratio 0 whose whole boundary is the slave: uniform stress and contact pressure, the area of the underside, no force along x."""
+        for kind, type_, n, m, ranks, more in (('quad4', 'mortar', 3, 4, 0, ''), ('quad4', 'mortar', 3, 4, 3, ''), ('tri3', 'mortar', 4, 3, 0, ''), ('quad4', 'surface', 3, 3, 2, ''),
+                                               ('hex8', 'mortar', 3, 2, 2, ''), ('tet4', 'pair', 2, 2, 0, ''), ('quad4', 'pair', 3, 3, 0, ', normal: {y: -1}')):
+            dim, hold = self.columns(kind, n, m)
+            fixed = ', '.join(f'{a}: 0' for a in 'xyz'[:dim])
+            text = COLUMNS % ('', fixed, 'x: 0', type_, more)
+            text = text.replace('hold: {x: 0}', ', '.join(f'{h}: {{{h[3]}: 0}}' for h in hold))
+            with self.subTest(kind=kind, type=type_, ranks=ranks):
+                found = self.hyco('solve', '-scene', self.written(text), ranks=ranks)
+                self.solved(found)
+                self.assertEqual(found['n_contacts'], (n + 1)**(dim - 1))
+                for name, value in {'along': 0, 'peak': 1, 'touch': 1, 'low': -1, 'high': -1}.items():
+                    self.assertAlmostEqual(found['outputs'][name], value, delta=1e-9, msg=name)
+
+    def test_normal(self):
+        """A given normal that points into the slave's body, or along its surface, is refused by contact and group by check, solve and train, on each rank count, for every type; as an obstacle's too."""
+        self.columns('quad4', 3, 3)
+        text = COLUMNS % (', parameters: [load]', 'x: 0, y: 0', 'x: 0', '%s', ', normal: {%s}') + 'parameter: {load: {range: [1, 2]}}\n'
+        text = text.replace('hold: {x: 0}', 'up_x0: {x: 0}').replace('up_y1: 1', 'up_y1: load')
+        at = ('-mu', 1)
+        for type_, normal, command, ranks in (('mortar', 'y: 1', 'solve', 0), ('surface', 'x: 1', 'solve', 2), ('pair', 'y: 1, x: 0.1', 'check', 0), ('pair', 'y: 1', 'train', 0), ('obstacle', 'y: 1', 'solve', 2),
+                                              ('obstacle', 'y: load', 'check', 0)):
+            scene = text % (type_, normal)
+            if type_ == 'obstacle':
+                scene = scene.replace('slave: skin, master: low_y1, tolerance: 0.05', 'group: up_y0, gap: 0')
+            more = {'solve': at, 'check': (), 'train': ('-grid', 2, '-model', 'm.h5')}[command]
+            run = self.run_raw(command, '-scene', self.written(scene), *more, ranks=ranks)
+            with self.subTest(type=type_, normal=normal, command=command, ranks=ranks):
+                self.assertEqual((run.returncode, run.stderr.count('hyco: error')), (1, 1), run.stdout + run.stderr)
+                for word in ('contact c', 'normal', 'up_y0' if type_ == 'obstacle' else 'skin'):
+                    self.assertIn(word, run.stderr)
+
+
+if __name__ == '__main__':
+    unittest.main()
