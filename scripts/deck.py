@@ -111,7 +111,7 @@ class Draft:
         self.axes = m.deck.axes  # the deck's axes that are x, y and z of the draft
         self.left, self.notes = {}, []
         self.bodies, self.materials, self.body_of, self.thickness = {}, {}, {}, 1.0
-        self.interactions, self.contacts, self.ties, self.rigids, self.loose = {}, {}, {}, [], {}
+        self.interactions, self.contacts, self.ties, self.rigids, self.loose, self.springs = {}, {}, {}, [], {}, {}
         self.material_now = self.interaction_now = None
         self.amplitudes, self.steps, self.initial = {}, [], {}
         self.given = {}    # by kind and keyword: what steps say of each degree of freedom, face or body
@@ -216,7 +216,7 @@ class Draft:
     def make(self):
         """Reads the blocks in order and sets the mesh's groups."""
         for name, block in self.deck.types.items():
-            if structural(name):
+            if structural(name) and (name != "SPRING1" or all(b.word != "SPRING" for b in self.deck.rest)):
                 self.leave(block, f"*ELEMENT, TYPE={name}", "these elements are left out; a scene has solids only" +
                            ("; a bar is a solid of its section, or spring: with EA over its length where it holds a point" if re.match(r"T[23]D", name) else ""))
             for pattern, why in VARIANTS:
@@ -314,6 +314,16 @@ class Draft:
         for key in keys:
             self.body_of[key] = title
 
+    def on_spring(self, block):
+        """Springs from points to the ground, of elements SPRING1."""
+        name, rows = block.parameters["ELSET"].upper(), [row for row in block.rows if any(row)]
+        nodes = self.deck.nsets.get(f"{block.instance}.SPRING1 {name}" if block.instance else "SPRING1 " + name, [])
+        axis = self.axis_of(int(item(rows[0], 0))) if len(rows) == 2 else ""
+        if not nodes or self.formulation() == "axisymmetric" or len(set(nodes)) < len(nodes) or not self.used.issuperset(nodes) or axis not in tuple(AXES[:self.dim()]):
+            self.leave(block, "*SPRING", WHY["SPRING"])
+            return
+        self.springs.setdefault(self.group("force", self.plain(name) + "_points", nodes, True), {})[axis] = item(rows[1], 0)
+
     # ---- contact, ties, rigid bodies
 
     def surfaces(self, row, block):
@@ -353,8 +363,8 @@ class Draft:
 
     def nodes_of(self, name):
         """The nodes of a group of the draft, in the order of its facets."""
-        found = self.surface(name)
-        return list(dict.fromkeys(n for f in found.facets for n in f.nodes)) if found else self.kept["node_groups"].get(name, [])
+        sides = self.sides_of(self.m, self.kept["facet_groups"].get(name, []))
+        return list(dict.fromkeys(n for *_, nodes in sides for n in nodes)) or self.kept["node_groups"].get(name, [])
 
     def adjust(self, block, slave, master):
         """*CONTACT PAIR, ADJUST: nodes of the slave nearer than a clearance, or of a set, are moved onto the master."""
@@ -916,6 +926,7 @@ class Draft:
         yield "body", [(t, "{" + ", ".join(f"{k}: {quoted(v)}" for k, v in self.material(t).items()) + "}", "") for t in self.bodies]
         for kind in ("fixed", "force", "traction"):
             yield kind, [(group, text, "") for group, text in axes(kind).items()]
+        yield "spring", [(group, "{" + ", ".join(f"{axis}: {said(k / self.thickness)}" for axis, k in of.items()) + "}", "") for group, of in self.springs.items()]
         yield "pressure", [(group, quoted(self.over_time(of[""])), "") for group, of in self.entry.get("pressure", {}).items()]
         yield "gravity", [(axis, quoted(self.over_time(parts)), "") for axis, parts in self.entry.get("gravity", {}).get("", {}).items()]
         if "rotation" in self.entry:

@@ -1,5 +1,4 @@
 """Surfaces of facets that face each other, for scripts/convert: what of a skin faces another surface, and the nearest points of facets."""
-import bisect
 import math
 
 OPPOSITE = -0.3  # the cosine between the normals of facets that face each other: 72 degrees, as in surface and mortar
@@ -42,14 +41,24 @@ def closest(p, a, b, c):
     return min(feet, key=lambda foot: math.dist(foot, p))
 
 
-class Facet:
-    """A facet: its nodes, its points around it, its normal out of the cell, its size and its triangles. In 2D it is as high as it is long."""
+def distance(p, low, high):
+    """That of a point from a box."""
+    return math.dist(p, (min(max(p[0], low[0]), high[0]), min(max(p[1], low[1]), high[1]), min(max(p[2], low[2]), high[2])))
 
-    def __init__(self, nodes, places, within, dim):
+
+def least(n, low, high):
+    """The least product of a vector with those of a box."""
+    return min(n[0] * low[0], n[0] * high[0]) + min(n[1] * low[1], n[1] * high[1]) + min(n[2] * low[2], n[2] * high[2])
+
+
+class Facet:
+    """A facet: its number and nodes, the points around it, its normal out of the cell, its size and its triangles. In 2D it is as high as it is long."""
+
+    def __init__(self, number, nodes, places, within, dim):
         ring, corners = [places[n] for n in nodes], {2: 2}.get(dim, 3 if len(nodes) in (3, 6) else 4)
         middle = ring[corners:2 * corners] if dim == 3 else ring[2:3]
         around = [p for pair in zip(ring, middle) for p in pair] + ring[len(middle):corners] if middle else ring[:corners]  # with middle nodes between the corners
-        self.nodes, self.centre = nodes, mean(ring[:corners])
+        self.number, self.nodes, self.centre = number, nodes, mean(ring[:corners])
         self.size = max(math.dist(p, q) for p in around for q in around)
         if dim == 2:
             low, high = ([[x, y, s * self.size / 2] for x, y, _ in around] for s in (-1, 1))
@@ -63,44 +72,43 @@ class Facet:
 
 
 class Surface:
-    """Facets of cells (cell, side, nodes) of a mesh, in which nearest points are found."""
+    """Facets of cells (cell, side, nodes) of a mesh, in a tree of boxes in which nearest points are found."""
 
     def __init__(self, m, sides, dim):
-        self.facets = [Facet(nodes, m.nodes, mean([m.nodes[n] for n in m.cells[cell][1]]), dim) for cell, _, nodes in sides]
-        spread = [max(c) - min(c) for c in zip(*(f.centre for f in self.facets))]
-        self.axis, self.lists = spread.index(max(spread)), {}
+        self.facets = [Facet(k, nodes, m.nodes, mean([m.nodes[n] for n in m.cells[cell][1]]), dim) for k, (cell, _, nodes) in enumerate(sides)]
+        self.root = None
 
-    def towards(self, normal):
-        """The triangles whose normals are opposite to one, or all, along the axis: [(place, centre, radius, triangle, facet)], and the largest radius."""
-        key = normal and tuple(round(c, 1) for c in normal)
-        if key not in self.lists:
-            found = []
-            for facet in self.facets:
-                if key is None or dot(facet.normal, normal) < OPPOSITE:
+    def box(self, facets):
+        """(low, high, least and greatest normals, facets or none, two boxes)"""
+        points = [p for f in facets for t in f.triangles for p in t]
+        low, high, least_normal, normal = ([pick(c) for c in zip(*of)] for of in (points, [f.normal for f in facets]) for pick in (min, max))
+        if len(facets) <= 4:
+            return low, high, least_normal, normal, facets, None
+        axis = max(range(3), key=lambda c: high[c] - low[c])
+        facets = sorted(facets, key=lambda f: f.centre[axis])
+        return low, high, least_normal, normal, None, (self.box(facets[:len(facets) // 2]), self.box(facets[len(facets) // 2:]))
+
+    def nearest(self, p, seen=None, limit=math.inf):
+        """The nearest point, nearer than the limit: (distance, point, facet), or None; of the facets opposite to `seen` alone, and not far behind it."""
+        self.root = self.root or self.box(self.facets)
+        best, stack = (limit, None, None), [self.root]
+        while stack:
+            low, high, first, last, facets, boxes = stack.pop()
+            if distance(p, low, high) > best[0] or seen and (least(seen.normal, first, last) >= OPPOSITE or -least(minus((0, 0, 0), seen.normal), low, high) - dot(seen.normal, p) < -0.5 * seen.size):
+                continue
+            if boxes:
+                stack += sorted(boxes, key=lambda box: distance(p, box[0], box[1]), reverse=True)
+            for facet in facets or ():
+                if math.dist(p, facet.centre) - facet.size < best[0] and (seen is None or dot(facet.normal, seen.normal) < OPPOSITE):
                     for triangle in facet.triangles:
-                        centre = mean(triangle)
-                        found.append((centre[self.axis], centre, max(math.dist(centre, p) for p in triangle), triangle, facet))
-            found.sort(key=lambda t: t[0])
-            self.lists[key] = ([t[0] for t in found], found, max((t[2] for t in found), default=0.0))
-        return self.lists[key]
-
-    def nearest(self, p, normal=None):
-        """The nearest point of the facets (that are opposite to a normal): (distance, point, facet); None if there is none."""
-        places, found, largest = self.towards(normal)
-        start, best = bisect.bisect(places, p[self.axis]), (math.inf, None, None)
-        for way in (range(start, len(found)), range(start - 1, -1, -1)):
-            for k in way:
-                place, centre, radius, triangle, facet = found[k]
-                if abs(place - p[self.axis]) - largest >= best[0]:
-                    break
-                if math.dist(p, centre) - radius < best[0]:
-                    q = closest(p, *triangle)
-                    best = min(best, (math.dist(p, q), q, facet), key=lambda b: b[0])
+                        q = closest(p, *triangle)
+                        if math.dist(p, q) < best[0]:
+                            best = (math.dist(p, q), q, facet)
         return best if best[1] else None
 
-    def ahead(self, p, facet):
+    def ahead(self, p, facet, limit=math.inf):
         """The nearest facet that is opposite to another one at p and lies ahead of it, not aside: (distance along the normal, facet)."""
-        far, q, hit = self.nearest(p, facet.normal) or (0, p, None)
+        far, q, hit = self.nearest(p, facet, limit) or (0, p, None)
         way = dot(minus(q, p), facet.normal)
         straight = hit and (abs(way) > -OPPOSITE * far or far < 0.1 * facet.size) and way > -0.5 * min(facet.size, hit.size)
         return (way, hit) if straight else (math.inf, None)
@@ -109,17 +117,18 @@ class Surface:
         """The numbers of the facets that face another surface: seen from a point of theirs or of the other's facets, and not behind a facet of the same surface."""
         found = set()
         for mine, its, back in ((self, other, False), (other, self, True)):
-            for k, facet in enumerate(mine.facets):
-                for p in facet.samples:
+            for facet in mine.facets:
+                for p in facet.samples[:1 if back else None]:
                     way, hit = its.ahead(p, facet)
-                    if hit and not 0 < mine.ahead(p, facet)[0] < way:
-                        found.add(self.facets.index(hit) if back else k)
+                    if hit and not (way > 1e-6 * facet.size and 0 < mine.ahead(p, facet, way)[0] < way):
+                        found.add(hit.number if back else facet.number)
+                        if not back:
+                            break
         return sorted(found)
 
     def turns(self):
         """Whether the surface goes round an edge of more than 40 degrees, or is as curved."""
-        kinds = {tuple(round(c, 2) for c in f.normal): f.normal for f in self.facets}
-        return any(dot(a, b) < 0.766 for a in kinds.values() for b in kinds.values())
+        return any(dot(f.normal, self.facets[0].normal) < 0.766 for f in self.facets)
 
 
 def adjusted(m, slave, master, wanted):

@@ -7,19 +7,19 @@ import re
 # that is not here, is listed; with !NAME the keyword is then left out as a whole.
 MESH = """
 ASSEMBLY: -NAME, -LIBRARY
-ELEMENT: TYPE, ELSET, INPUT
+ELEMENT: TYPE, ELSET
 ELSET: ELSET, GENERATE, INSTANCE, -INTERNAL, -UNSORTED
 END ASSEMBLY:
 END INSTANCE:
 END PART:
 INSTANCE: NAME, PART, !INSTANCE, !LIBRARY
-NODE: NSET, INPUT, !SYSTEM=R
+NODE: NSET, !SYSTEM=R
 NSET: NSET, ELSET, GENERATE, INSTANCE, -INTERNAL, -UNSORTED
 PART: NAME
 SURFACE: NAME, TYPE=ELEMENT|NODE, -INTERNAL, -NO OFFSET, -NO THICKNESS, !COMBINE=UNION
 """
 READ = """
-AMPLITUDE: NAME, BEGIN, !DEFINITION=TABULAR|EQUALLY SPACED|SMOOTH STEP, FIXED INTERVAL, INPUT, SHIFTX, SHIFTY, TIME=STEP TIME|TOTAL TIME, !USER, VALUE=RELATIVE|ABSOLUTE
+AMPLITUDE: NAME, BEGIN, !DEFINITION=TABULAR|EQUALLY SPACED|SMOOTH STEP, FIXED INTERVAL, SHIFTX, SHIFTY, TIME=STEP TIME|TOTAL TIME, !USER, VALUE=RELATIVE|ABSOLUTE
 BOUNDARY: AMPLITUDE, FIXED, -LOAD CASE, OP=MOD|NEW, -REGION TYPE, !SUBMODEL, !TYPE=DISPLACEMENT, !USER
 CLEARANCE: MASTER, SLAVE, !TABULAR, VALUE
 CLOAD: AMPLITUDE, -FOLLOWER, -LOAD CASE, OP=MOD|NEW, -REGION TYPE, !SUBMODEL, !USER
@@ -42,6 +42,7 @@ PLASTIC: HARDENING=ISOTROPIC, RATE
 RESTART: -FREQUENCY, -NUMBER INTERVAL, -OVERLAY, -TIME MARKS, -WRITE
 RIGID BODY: !ANALYTICAL SURFACE, ELSET, -ISOTHERMAL, NSET, PIN NSET, REF NODE, ROT NODE, TIE NSET
 SOLID SECTION: !COMPOSITE, -CONTROLS, ELSET, MATERIAL, -ORIENTATION
+SPRING: ELSET, !NONLINEAR, !ORIENTATION
 STATIC: -ALLSDTOL, -CONTINUE, -DIRECT, -FACTOR, -SOLVER
 STEP: AMPLITUDE=STEP|RAMP, -CONVERT SDI, -EXTRAPOLATION, -INC, -INCF, -NAME, NLGEOM=NO|OFF, -SOLVER, -UNSYMM
 SURFACE BEHAVIOR: -AUGMENTED LAGRANGE, -DIRECT, -PENALTY, PRESSURE-OVERCLOSURE=HARD|LINEAR|TIED
@@ -61,7 +62,7 @@ WHY = {"FRICTION": "only a constant coefficient of a surface interaction is fric
        "MPC": "no constraints of this kind", "COUPLING": "no couplings of a reference point, unless it does not move", "COUPLING, ORIENTATION": "the axes are x, y and z",
        "DISTRIBUTING COUPLING": "no couplings of a reference point", "KINEMATIC COUPLING": "no couplings of a reference point",
        "HOURGLASS STIFFNESS": "cells are fully integrated", "TRANSFORM": "supports and loads in turned axes: see fixed: direction in scenes.md",
-       "SHELL SECTION": "no shells", "BEAM SECTION": "no beams", "MEMBRANE SECTION": "no membranes", "CONNECTOR SECTION": "no connectors", "SPRING": "see spring: in scenes.md",
+       "SHELL SECTION": "no shells", "BEAM SECTION": "no beams", "MEMBRANE SECTION": "no membranes", "CONNECTOR SECTION": "no connectors", "SPRING": "only SPRING1 of one stiffness; see spring: in scenes.md",
        "MASS": "no point masses", "DASHPOT": "no dampers", "CONTACT": "general contact: name the pairs of surfaces as contacts", "CONTACT INCLUSIONS": "general contact: name the pairs of surfaces as contacts",
        "CONTACT INCLUSIONS, ALL EXTERIOR": "general contact: name the pairs of surfaces as contacts",
        "DYNAMIC": "no inertia", "DAMPING": "no inertia", "PRE-TENSION SECTION": "no pretension: prescribe a displacement of one side",
@@ -134,8 +135,8 @@ def unread(block):
         return ([] if block.word in QUIET else [(f"*{block.word}", WHY.get(block.word, "the reader does not know this keyword"))]), False
     listed, taken = [], True
     for name, value in block.parameters.items():
-        mark, values = known.get(name, ("?", None))
-        if mark == "-" or mark == "" and values is None or values is not None and value in values:
+        mark, values = known.get(name, ("?", None))  # blocks_of() has read the data lines of INPUT
+        if name == "INPUT" or mark == "-" or mark == "" and values is None or values is not None and value in values:
             continue
         listed.append((f"*{block.word}, {name}" + (f"={value.upper()}" if value else ""), WHY.get(f"{block.word}, {name}", OTHER)))
         taken = taken and mark != "!"

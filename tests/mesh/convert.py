@@ -167,21 +167,22 @@ class Convert(Case):
         self.assertEqual(self.convert('empty.unv', UNV.replace('  2467\n', '  2467\n' + empty)), self.convert('cube.unv', UNV))
 
     def test_second_order(self):
-        """A cube of one C3D20 and a tetrahedron of one C3D10, in Abaqus's order: pressure on each side S1, S2, ... has the resultant of that side, gravity that of the volume."""
+        """A cube of one C3D20 or C3D27 and a tetrahedron of one C3D10, in Abaqus's order: pressure on each side S1, S2, ... has the resultant of that side, gravity that of the volume."""
         cube = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
         tet = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
         ring = [(0, 1), (1, 2), (2, 3), (3, 0)]
+        edges, sides = [*ring, *((a + 4, b + 4) for a, b in ring), *((k, k + 4) for k in range(4))], ((0, 0, 1), (0, 0, -1), (0, 1, 0), (-1, 0, 0), (0, -1, 0), (1, 0, 0))
+        middles = [range(8), range(4), range(4, 8), *((a, b, a + 4, b + 4) for a, b in ring)]  # of the cell and of S1, S2, ...
         for kind, corners, edges, volume, pushes in (
-                ('C3D20R', cube, [*ring, *((a + 4, b + 4) for a, b in ring), *((k, k + 4) for k in range(4))], 1,
-                 ((0, 0, 1), (0, 0, -1), (0, 1, 0), (-1, 0, 0), (0, -1, 0), (1, 0, 0))),
+                ('C3D20R', cube, edges, 1, sides), ('C3D27', cube, edges + middles, 1, sides),
                 ('C3D10', tet, [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)], 1 / 6, ((0, 0, .5), (0, .5, 0), (-.5, -.5, -.5), (.5, 0, 0)))):
-            places = [*corners, *(tuple((a + b) / 2 for a, b in zip(corners[i], corners[j])) for i, j in edges)]
+            places = [*corners, *(tuple(sum(c) / len(c) for c in zip(*(corners[i] for i in of))) for of in edges)]
             numbers = [str(k + 1) for k in range(len(places))]
             text = '*Node\n' + ''.join(f'{k}, {x}, {y}, {z}\n' for k, (x, y, z) in enumerate(places, 1))
             text += f'*Element, type={kind}, elset=body\n1, {", ".join(numbers[:9])},\n{", ".join(numbers[9:])}\n'
             text += ''.join(f'*Surface, type=ELEMENT, name=side{k}\n1, S{k}\n' for k in range(1, len(pushes) + 1)) + '*Nset, nset=foot\n1, 2, 3\n'
             groups = self.convert('second.inp', text)
-            self.assertEqual(groups['BODY'], (1, {'C3D20R': 'hex20', 'C3D10': 'tet10'}[kind]))
+            self.assertEqual(groups['BODY'], (1, {'C3D20R': 'hex20', 'C3D27': 'hex27', 'C3D10': 'tet10'}[kind]))
             self.pushed(kind, volume, pushes)
 
     def test_gmsh_second_order(self):

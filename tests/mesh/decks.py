@@ -556,6 +556,10 @@ class Decks(Case):
         self.solve(folder)
         self.convert('exchanged', deck([a, b], '*TIE, NAME=T\nB_SZ0, A_SZ1\n*BOUNDARY\nA_Z0, 1, 3\nB_X0, 1, 1\n', [('', '*STATIC\n*DSLOAD\nB_SZ1, P, 3.\n')]))
         self.solve(self.path('exchanged'))  # a tied node with a support of its own would be refused
+        held = '*BOUNDARY\nA_Y0, 2, 2\n1, 1, 1\n*ELEMENT, TYPE=SPRING1, ELSET=K\n91, 2\n92, 4\n*SPRING, ELSET=K\n2\n7.\n'
+        left, folder = self.convert('sprung', deck([flat], held, [('', '*STATIC\n*CLOAD\nA_Y1, 2, 50.\n')], STEEL.replace('210000', '100')))
+        self.assertEqual(left, [])
+        self.near(self.solve(folder).displacement[:, 1].max(), 100 / (100 + 2 * 7), 1e-9)  # cell and springs side by side
         for slope, soft in (('5.e7', False), ('5.e4', True)):
             left, folder = self.convert('tied' + slope, deck([a, b], pair('B_SZ0', 'A_SZ1').replace('LINEAR\n5.e7', 'TIED\n' + slope) + SYMMETRY, [('', '*STATIC\n')]))
             with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
