@@ -65,6 +65,12 @@ typedef struct {
      more than HYCO_UNSEEN, so that displacements, stresses and reactions do not follow the forces. */
   PetscReal inconsistency;
   PetscBool inconsistent;
+  /* What the loads and contact forces on a body, with all that its supports can carry, miss of the balance of forces and
+     moments: along each motion that the supports leave free, relative to the sum of the magnitudes there, the largest, of a
+     path of all listed times; < 0: not compared, as supports carry whatever is left. unbalanced: it is larger than the
+     estimated error of the contact forces. */
+  PetscReal balance;
+  PetscBool unbalanced;
   /* How much larger than at all held-out points an indicator of the errors is, at least 1, and its index in
      HycoFeatureNames (-1: none is). Above HYCO_UNSEEN the prediction is in a regime by which the model was not judged;
      the estimates are multiplied by it, up to 100. */

@@ -427,6 +427,8 @@ void HycoBodiesMotionRow(HycoBodiesWork work, PetscInt k, PetscReal g[]);
 /* The residuals at the contacts, recomputed from U and the forces; `stationarity` is that of floating bodies. */
 void HycoBodiesMeasure(HycoROM model, HycoKKT *kkt);
 PetscReal HycoBodiesUnbalanced(HycoBodiesWork work);
+/* The same with all of the round-off, as HycoROM's `imbalance`; -1: supports prevent all motions. */
+PetscReal HycoBodiesImbalance(HycoBodiesWork work);
 PetscErrorCode HycoBodiesLoose(HycoBodiesWork work, PetscInt n, const PetscReal Lambda[], PetscBool *loose);
 /* "body NAME in its place", of the bodies that contact alone holds. */
 void HycoBodiesNameFloating(HycoBodiesWork work, HycoScene scene, char name[HYCO_LINE]);

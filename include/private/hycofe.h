@@ -203,6 +203,8 @@ PetscErrorCode HycoFESetPins(HycoFE fe, PetscInt n, const PetscInt tag[], const 
 PetscErrorCode HycoFEFreeMotions(MPI_Comm comm, HycoFE fe, HycoMotions *motions);
 /* The same without the springs, which then hold nothing. */
 PetscErrorCode HycoFEUnsupportedMotions(MPI_Comm comm, HycoFE fe, HycoMotions *motions);
+/* Of a process's own mesh of cells around supports and loads, whose nodes are in these parts (part: by node). */
+PetscErrorCode HycoFEMotionsOfParts(HycoFE fe, PetscInt n_parts, const PetscInt part[], HycoMotions *motions);
 PetscErrorCode HycoMotionsDestroy(HycoMotions *motions);
 /* "body B from moving along ..." for the combination of motions with these coefficients. */
 void HycoMotionsName(HycoFE fe, const HycoMotions *motions, const PetscReal coefficient[], char name[HYCO_LINE]);

@@ -33,6 +33,8 @@ PetscErrorCode HycoQuantitiesMarkStressed(HycoScene scene, HycoMesh mesh, PetscB
 /* Which reactions follow from balance (balance.c): balanced[k * n_bodies + b], for each quantity k the bodies b of
    whose loads and contact forces it is minus the sum; for no body: it does not follow. mesh: whole, or the processes'
    parts. Collective. */
+/* part[b]: the first of the bodies that share nodes with body b or are tied to it, directly or by others. Collective. */
+PetscErrorCode HycoJoinBodies(MPI_Comm comm, HycoScene scene, HycoMesh mesh, PetscInt part[]);
 PetscErrorCode HycoQuantitiesBalance(MPI_Comm comm, HycoScene scene, HycoMesh mesh, PetscBool balanced[]);
 /* Marks the cells (n_cells) with the loads of the bodies of[b], and those of all loads on facets, points and lines,
    which may be shared with other bodies. */

@@ -148,6 +148,7 @@ struct _p_HycoROM {
   HycoPairs whole_pairs;        /* as `pairs`, on whole */
   char loose[HYCO_LINE];        /* where prediction.loose is set: "body NAME in its place" */
   HycoFE fe_floating;           /* on the loaded cells of the bodies that contact alone holds */
+  HycoRigid *rigid;             /* their motions at the last prediction, if parameters change them */
   HycoOutputCells output_cells; /* of the scene's quantities */
   HycoOutputCells few;          /* those of them that decide the quantities near a prediction; NULL: not needed yet */
   HycoCarried carried;          /* results of the contacts (contact_results.c) */
@@ -162,7 +163,11 @@ struct _p_HycoROM {
                                called */
   PetscBool whole_current;  /* U_whole is current */
   PetscBool balanced;       /* balance belongs to it */
-  PetscReal stretch;   /* growth of the errors of what is interpolated, 1 or less inside; the ops `features` sets it */
+  PetscReal stretch; /* growth of the errors of what is interpolated, 1 or less inside; the ops `features` sets it */
+  PetscReal
+      imbalance; /* of the forces and moments on the bodies; corrected: before forces were scaled for it; < 0: they are
+                          not compared. Of a path the largest */
+  PetscReal corrected;
   PetscReal remainder; /* of (41): the relative difference of the forces in the RID; of a path the largest */
   PetscReal *gamma, *U, *Lambda, *stress, *U_whole;
   PetscInt n_modal, *modal; /* the unknowns of fe that are not full-order ones; NULL: not needed yet */
@@ -339,14 +344,16 @@ PetscErrorCode HycoROMPushBodies(HycoROM model, const PetscReal Lambda[], const 
 
 /*
   Equilibrium of bodies that contact alone holds (floating.c). HycoFloatingCreate(): n rigid motions that no support or
-  spring prevents, the bodies of[n x n_bodies] that each moves, the mesh of the cells with their loads (NULL: none);
+  spring prevents, the bodies of[n x n_bodies] that each moves, whether parameters change them, the mesh of the cells
+  with these bodies' loads (NULL: none), and then supports;
   takes ownership of the mesh, after an error too. HycoFloatingMove(): writes it to the model file or reads it.
   HycoFloatingBalance(): at the last prediction's parameters, scales the positive forces in Lambda, each by the
   exponential of a linear combination of its works on the motions, so that the forces' work on each motion is that of
-  the loads; forces that cannot do that stay as they are. After HycoROMSetUp(). All are NULL-safe.
+  the loads; forces that cannot do that stay as they are; raises `imbalance` and `corrected` by what is left and what was
+  before. After HycoROMSetUp(). All are NULL-safe.
 */
 PetscErrorCode HycoFloatingCreate(PetscInt n, const HycoRigid rigid[], PetscInt n_bodies, const PetscInt of[],
-                                  HycoMesh loaded, HycoFloating *floating);
+                                  PetscBool moves, HycoMesh loaded, HycoFloating *floating);
 PetscErrorCode HycoFloatingMove(HycoH5 file, HycoROM model);
 PetscErrorCode HycoFloatingBalance(HycoROM model);
 PetscErrorCode HycoFloatingDestroy(HycoFloating *floating);

@@ -32,6 +32,7 @@ static PetscErrorCode ReportEstimates(cJSON *json, HycoScene scene, const HycoPr
   outputs = n ? cJSON_AddObjectToObject(json, "estimated_error_outputs") : NULL;
   for (PetscInt q = 0; q < n; q++) Estimate(outputs, names[q], p->estimated_error_quantity[q]);
   Estimate(json, "inconsistency", p->inconsistency);
+  Estimate(json, "balance", p->balance);
   cJSON_AddNumberToObject(json, "unseen", p->unseen);
   /* The feature matters only where it is out of the range of the training. */
   if (p->unseen > HYCO_UNSEEN) cJSON_AddStringToObject(json, "unseen_feature", HycoFeatureNames[p->unseen_feature]);
@@ -76,6 +77,7 @@ static PetscErrorCode PrintEstimates(HycoScene scene, const HycoPrediction *p, c
     else
       snprintf(words[k], sizeof(words[k]), "none");
   }
+  PetscCall(DriverPrintBalance(p->balance));
   PetscCall(DriverPrint("estimated errors: u %s, stress %s, contact forces %s\n", words[0], words[1], words[2]));
   PetscCall(PrintOutputEstimates(scene, p));
   DriverPercent(p->beyond, words[0]);
@@ -92,6 +94,11 @@ static PetscErrorCode PrintEstimates(HycoScene scene, const HycoPrediction *p, c
         DriverMissed("the displacements do not follow the contact forces: at closed contacts they miss the gaps by "
                      "%.2g of the largest displacement there; add training points, or use -hyco_fallback%s",
                      (double)p->inconsistency, p->gives_forces ? " or -hyco_full_displacement" : ""));
+  if (p->unbalanced)
+    PetscCall(
+        DriverMissed("contact forces, loads and supports do not balance: they miss %.2g of the forces and moments "
+                     "on a body, more than the estimated error; add training points, or use -hyco_fallback",
+                     (double)p->balance));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -298,6 +305,7 @@ enum {
   BEYOND,
   UNSEEN,
   INCONSISTENCY,
+  BALANCE,
   FORCES_UNIQUE,
   FULL_ORDER,
   PATH_FORCE, /* only for paths */
@@ -322,6 +330,7 @@ static const char *const columns[N_COLUMNS] = {"total_contact_force",
                                                "beyond",
                                                "unseen",
                                                "inconsistency",
+                                               "balance",
                                                "forces_unique",
                                                "full_order",
                                                "largest_contact_force",
@@ -406,6 +415,7 @@ static void FillRow(const HycoPrediction *p, PetscInt n_carried, const HycoConta
   v[BEYOND] = p->beyond;
   v[UNSEEN] = p->unseen;
   v[INCONSISTENCY] = Known(p->inconsistency);
+  v[BALANCE] = Known(p->balance);
   v[FORCES_UNIQUE] = p->n_dependent < 0 ? NAN : p->n_dependent == 0;
   if (s->own > PATH_FORCE) {
     v[PATH_FORCE] = p->path_force;
@@ -435,7 +445,7 @@ typedef struct {
   const Shape *shape;
   HycoQueue queue;
   PetscReal *value; /* of the piece */
-  PetscInt n_unseen, n_inconsistent;
+  PetscInt n_unseen, n_inconsistent, n_unbalanced;
   DriverLacking *lacking;
 } Taken;
 
@@ -469,6 +479,7 @@ static PetscErrorCode TakePoint(HycoROM model, PetscInt k, void *ctx)
   v[FULL_ORDER] = why[0] != '\0'; /* required; SolveRest() solves it */
   t->n_unseen += !why[0] && p.unseen > HYCO_UNSEEN;
   t->n_inconsistent += !why[0] && p.inconsistent;
+  t->n_unbalanced += !why[0] && p.unbalanced;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -510,10 +521,10 @@ static PetscErrorCode PredictQueued(HycoROM model, PetscInt each, PetscInt n_par
 /* Reports the points of all ranks at which the model's estimates or displacements are in doubt. */
 static PetscErrorCode PrintDoubts(PetscInt n, const Taken *t)
 {
-  PetscInt count[2] = {t->n_unseen, t->n_inconsistent};
+  PetscInt count[3] = {t->n_unseen, t->n_inconsistent, t->n_unbalanced};
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 2, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 3, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
   if (count[0])
     PetscCall(DriverPrint(
         "UNSEEN REGIME at %d of %d points: column unseen is above %d, and the estimates are not tested there\n",
@@ -522,6 +533,10 @@ static PetscErrorCode PrintDoubts(PetscInt n, const Taken *t)
     PetscCall(DriverMissed("the displacements do not follow the contact forces at %d of %d points (column "
                            "inconsistency); add training points, or use -hyco_fallback",
                            (int)count[1], (int)n));
+  if (count[2])
+    PetscCall(DriverMissed("contact forces, loads and supports do not balance at %d of %d points (column balance); add "
+                           "training points, or use -hyco_fallback",
+                           (int)count[2], (int)n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

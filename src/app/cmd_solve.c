@@ -56,6 +56,7 @@ static PetscErrorCode PrintReactions(cJSON *json, HycoFOM fom, PetscInt dim)
                             (double)r[k].force[0], (double)r[k].force[1], (double)r[k].force[2]));
   }
   cJSON_AddNumberToObject(json, "balance", balance);
+  PetscCall(DriverPrintBalance(balance));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

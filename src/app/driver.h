@@ -351,6 +351,8 @@ void DriverReportModel(cJSON *json, const Search *search, const HycoTraining *tr
 PetscErrorCode DriverPrintStep(const HycoStep *step, PetscInt n);
 /* Says that contact forces are not unique, if there are dependent contacts: of a path with the listed times. */
 PetscErrorCode DriverPrintDependent(PetscInt n_dependent, PetscInt n, const HycoStep step[]);
+/* What forces and moments miss of balance; < 0: not compared. */
+PetscErrorCode DriverPrintBalance(PetscReal balance);
 /* A CSV ("": none) with a row for each of n times. Collective. */
 PetscErrorCode DriverWriteSteps(const char table[], HycoScene scene, const PetscReal mu[], PetscBool reduced,
                                 PetscInt n, const HycoStep step[]);

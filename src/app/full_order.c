@@ -99,6 +99,9 @@ void DriverWantsFullOrder(const Fallback *f, const HycoPrediction *p, char why[D
   else if (p->inconsistent)
     snprintf(why, DRIVER_LINE, "the displacements do not follow the contact forces (%.2g of their size)",
              (double)p->inconsistency);
+  else if (p->unbalanced)
+    snprintf(why, DRIVER_LINE, "contact forces, loads and supports do not balance (they miss %.2g)",
+             (double)p->balance);
   else if (p->unseen > HYCO_UNSEEN)
     snprintf(why, DRIVER_LINE, "the %s is %.2g times that at any held-out point", HycoFeatureNames[p->unseen_feature],
              (double)p->unseen);
@@ -118,8 +121,13 @@ void DriverWantsFullOrder(const Fallback *f, const HycoPrediction *p, char why[D
 }
 
 /* Takes the displacement's part of the summary, over the whole mesh. */
-static void TakeDisplacement(Fallback *f, const HycoSummary *s, HycoPrediction *p)
+static PetscErrorCode TakeDisplacement(Fallback *f, const HycoSummary *s, HycoPrediction *p)
 {
+  const HycoReaction *reaction;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetReactions(f->fom, &n, &reaction, &p->balance));
   p->reason = s->reason;
   p->kkt = s->kkt;
   p->u_norm2 = s->u_norm2;
@@ -133,6 +141,7 @@ static void TakeDisplacement(Fallback *f, const HycoSummary *s, HycoPrediction *
     p->u_min[c] = s->u_min[c];
     p->u_max[c] = s->u_max[c];
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Rank 0 has the forces. The forces' own estimate stays, those of displacements do not apply any more. */
@@ -148,7 +157,7 @@ PetscErrorCode DriverSolveDisplacement(Fallback *f, HycoROM model, PetscInt n, c
   if (!f->fom) PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, f->scene, &f->fom));
   PetscCall(HycoFOMSolveForces(f->fom, n, mu, Lambda));
   PetscCall(HycoFOMGetSummary(f->fom, &s));
-  TakeDisplacement(f, &s, p);
+  PetscCall(TakeDisplacement(f, &s, p));
   p->estimated_error_u = -1;                                                              /* that of the modes */
   for (PetscInt k = 0; k < HYCO_MAX_QUANTITIES; k++) p->estimated_error_quantity[k] = -1; /* of other displacements */
   if (s.reason > 0) p->reason = reason; /* the reason of the forces' solve */
@@ -174,7 +183,7 @@ PetscErrorCode DriverSolveFullOrder(Fallback *f, PetscInt n, const PetscReal mu[
   PetscCall(HycoFOMGetSolver(f->fom, &solver));
   PetscCall(HycoSolverGetMethod(solver, &method));
   PetscCall(PetscStrncpy(p->method, method, sizeof(p->method)));
-  TakeDisplacement(f, &s, p);
+  PetscCall(TakeDisplacement(f, &s, p));
   p->iterations = s.iterations;
   p->n_active = p->n_rid_active = s.n_active;
   p->n_dof = p->n_fe_dofs = s.n_dof;

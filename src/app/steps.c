@@ -114,6 +114,17 @@ PetscErrorCode DriverPrintDependent(PetscInt n_dependent, PetscInt n, const Hyco
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode DriverPrintBalance(PetscReal balance)
+{
+  PetscFunctionBegin;
+  if (balance >= 0)
+    PetscCall(DriverPrint("balance of loads, contact and supports, forces and moments of each body: to %.1e\n",
+                          (double)balance));
+  else
+    PetscCall(DriverPrint("balance of forces: not compared, supports carry what is left\n"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* mu in each row: tables of several paths can be put together. */
 PetscErrorCode DriverWriteSteps(const char table[], HycoScene scene, const PetscReal mu[], PetscBool reduced,
                                 PetscInt n, const HycoStep step[])

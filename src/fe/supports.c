@@ -356,6 +356,7 @@ static PetscErrorCode PlaceParts(MPI_Comm comm, HycoFE fe, const PetscInt part[]
   HycoAllreduce(last, n_parts, MPIU_INT64, MPI_MAX, comm);
   PetscCall(Total(comm, 4 * n_parts, sum));
   for (PetscInt p = 0; p < n_parts; p++) {
+    if (!(sum[4 * p].high > 0)) continue; /* of a part of the mesh */
     parts[p].body = (PetscInt)(last[p] % n_bodies);
     for (PetscInt c = 0; c < 3; c++) parts[p].centre[c] = sum[4 * p + 1 + c].high / sum[4 * p].high;
   }
@@ -447,25 +448,44 @@ static PetscErrorCode MeasureParts(MPI_Comm comm, HycoFE fe, PetscBool springs, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Those of n_parts parts, part[] by node. */
+static PetscErrorCode MotionsOfParts(MPI_Comm comm, HycoFE fe, PetscBool springs, PetscInt n_parts,
+                                     const PetscInt part[], HycoMotions *motions)
+{
+  Part *parts;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(n_parts, &parts));
+  PetscCall(PlaceParts(comm, fe, part, n_parts, parts));
+  PetscCall(MeasureParts(comm, fe, springs, part, n_parts, parts));
+  for (PetscInt p = 0; p < n_parts; p++) {
+    if (parts[p].size > 0) PetscCall(PartMotions(comm, fe, part, p, &parts[p], motions));
+  }
+  PetscCall(PetscFree(parts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Rigid motions that supports, and `springs`, leave, orthonormal over all unknowns, part by part in the order of the
    mesh file: identical on any number of ranks. Values at local unknowns; the caller destroys them. Collective. */
 static PetscErrorCode FindMotions(MPI_Comm comm, HycoFE fe, PetscBool springs, HycoMotions *motions)
 {
-  HycoMesh m = fe->mesh;
-  PetscInt *part, n_parts;
-  Part *parts;
+  PetscInt n_parts;
 
   PetscFunctionBegin;
   PetscCall(PetscMemzero(motions, sizeof(*motions)));
-  PetscCall(PetscMalloc1(m->n_nodes, &part));
-  motions->part = part;
+  PetscCall(PetscMalloc1(fe->mesh->n_nodes, &motions->part));
   /* Connected parts of the mesh: each may move by itself. */
-  PetscCall(FindParts(comm, m, part, &n_parts));
-  PetscCall(PetscCalloc1(n_parts, &parts));
-  PetscCall(PlaceParts(comm, fe, part, n_parts, parts));
-  PetscCall(MeasureParts(comm, fe, springs, part, n_parts, parts));
-  for (PetscInt p = 0; p < n_parts; p++) PetscCall(PartMotions(comm, fe, part, p, &parts[p], motions));
-  PetscCall(PetscFree(parts));
+  PetscCall(FindParts(comm, fe->mesh, motions->part, &n_parts));
+  PetscCall(MotionsOfParts(comm, fe, springs, n_parts, motions->part, motions));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEMotionsOfParts(HycoFE fe, PetscInt n_parts, const PetscInt part[], HycoMotions *motions)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscMemzero(motions, sizeof(*motions)));
+  HycoDuplicate(fe->mesh->n_nodes, part, &motions->part);
+  PetscCall(MotionsOfParts(PETSC_COMM_SELF, fe, PETSC_TRUE, n_parts, motions->part, motions));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

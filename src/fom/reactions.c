@@ -4,10 +4,11 @@
     R = f_int - F + B^T L  there,
 
   with f_int = K u, for a path that of its last step; the forces of springs; the resultants of loads and of obstacles.
-  Together they balance in each direction, except the radial one of an axisymmetric scene.
+  On each body they balance in each direction, except the radial one of an axisymmetric scene, and in their moments.
 */
 #include <hycofields.h>
 #include <hycopath.h>
+#include <hycoquantities.h>
 
 /* -B^T L at all unknowns of the part, fixed ones too, from the contacts of all ranks. Collective. All components at
    fixed unknowns too, which B does not have: therefore from the contacts' normals, not from B^T. */
@@ -115,12 +116,35 @@ static PetscErrorCode FindSupports(HycoFOM f, PetscInt support[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Results of Sums(): supports first, then springs, the loads, the obstacles; and the sum of all magnitudes. */
+#define SMALL 1e-6 /* share of all forces to which a body with smaller ones is compared */
+
+/* Everything on a body, or on bodies that share nodes or are tied: the magnitudes too, those of moments about the centre. */
+typedef struct {
+  HycoReaction all;
+  PetscReal size, turns;
+} OnBody;
+
+/* Results of Sums(): supports first, then springs, the loads, the obstacles; of the bodies part[b]. */
 typedef struct {
   HycoReaction *result;
   const PetscReal *u;
-  PetscReal size;
+  PetscReal centre[3];
+  PetscInt *part;
+  OnBody *body;
 } Sums;
+
+/* Adds a nodal force to a resultant and to those of its body. */
+static void AddBoth(Sums *s, HycoFE fe, PetscInt dof, PetscReal value, HycoReaction *to)
+{
+  OnBody *body = &s->body[s->part[fe->mesh->node_body[dof / fe->dim]]];
+  PetscReal arm = 0;
+
+  AddTo(fe, dof, value, to);
+  AddTo(fe, dof, value, &body->all);
+  for (PetscInt c = 0; c < 3; c++) arm = PetscMax(arm, PetscAbsReal(fe->X[3 * (dof / fe->dim) + c] - s->centre[c]));
+  body->size += PetscAbsReal(value);
+  body->turns += arm * PetscAbsReal(value);
+}
 
 /* -K u of the springs that this process counts. */
 static PetscErrorCode AddSpring(HycoFE fe, PetscInt spring, PetscInt n, const PetscInt node[], const PetscReal K[],
@@ -134,8 +158,7 @@ static PetscErrorCode AddSpring(HycoFE fe, PetscInt spring, PetscInt n, const Pe
     PetscReal force = 0;
 
     for (PetscInt t = 0; t < size; t++) force -= K[r * size + t] * s->u[node[t / fe->dim] * fe->dim + t % fe->dim];
-    AddTo(fe, node[r / fe->dim] * fe->dim + r % fe->dim, force, &s->result[fe->scene->n_fixed + spring]);
-    s->size += PetscAbsReal(force);
+    AddBoth(s, fe, node[r / fe->dim] * fe->dim + r % fe->dim, force, &s->result[fe->scene->n_fixed + spring]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -168,7 +191,7 @@ static void Resolve(PetscInt n, const HycoOblique *const o[], const PetscBool pl
 /* The force of each support on a node: r is that of the unknowns, support[] the support of each. In an oblique
    support the unknowns' force is along the eliminated component; the force along n follows by least squares, the
    rest belongs to plain supports. */
-static void AddSupports(HycoFE fe, PetscInt node, const PetscReal r[], const PetscInt support[], HycoReaction result[])
+static void AddSupports(Sums *s, HycoFE fe, PetscInt node, const PetscReal r[], const PetscInt support[])
 {
   const HycoOblique *o[3];
   PetscBool plain[3] = {PETSC_FALSE};
@@ -188,13 +211,13 @@ static void AddSupports(HycoFE fe, PetscInt node, const PetscReal r[], const Pet
   if (n) Resolve(n, o, plain, force, rho);
   for (PetscInt k = 0; k < n; k++) {
     for (PetscInt d = 0; d < fe->dim; d++) {
-      AddTo(fe, node * fe->dim + d, rho[k] * o[k]->n[d], &result[o[k]->support]);
+      AddBoth(s, fe, node * fe->dim + d, rho[k] * o[k]->n[d], &s->result[o[k]->support]);
       force[d] -= rho[k] * o[k]->n[d];
     }
   }
   for (PetscInt c = 0; c < fe->dim; c++) {
     if (plain[c] && support[node * fe->dim + c] >= 0)
-      AddTo(fe, node * fe->dim + c, force[c], &result[support[node * fe->dim + c]]);
+      AddBoth(s, fe, node * fe->dim + c, force[c], &s->result[support[node * fe->dim + c]]);
   }
 }
 
@@ -213,50 +236,101 @@ static PetscErrorCode AddUp(HycoFOM f, PetscReal *work, PetscInt support[], Sums
   PetscCall(FindSupports(f, support));
   for (PetscInt i = 0; i < f->part->n_nodes; i++) {
     if (HycoMeshOwned(f->part, i) < 0) continue;
-    AddSupports(f->fe, i, r, support, s->result);
+    AddSupports(s, f->fe, i, r, support);
     for (PetscInt k = i * dim; k < (i + 1) * dim; k++) {
-      AddTo(f->fe, k, load[k], &loads[0]);
-      AddTo(f->fe, k, contact[k], &loads[1]);
-      /* The scale of the balance: magnitudes of all that is summed. */
-      s->size += PetscAbsReal(r[k]) + PetscAbsReal(load[k]) + PetscAbsReal(contact[k]);
+      AddBoth(s, f->fe, k, load[k], &loads[0]);
+      AddBoth(s, f->fe, k, contact[k], &loads[1]);
     }
   }
   PetscCall(HycoSpringsVisit(f->fe, AddSpring, s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sums over the ranks, and the imbalance of the sum. Collective. Largest component of the resultant of everything,
-   over the sum of all magnitudes. Forces alone: moments about the origin depend on its distance. */
+/* The largest component of what is left on a body of the forces, and of the moments about the centre, each over the sum of
+   its magnitudes. Moments of tied bodies depend on how their nodes are tied. */
+static PetscReal Left(const HycoFOM f, const Sums *s, PetscInt b, PetscReal force, PetscReal moment)
+{
+  const OnBody *on = &s->body[b];
+  const PetscReal size = PetscMax(on->size, SMALL * force), turns = PetscMax(on->turns, SMALL * moment);
+  const PetscReal *F = on->all.force;
+  PetscReal most = 0;
+
+  for (PetscInt c = 0; c < 3 && size > 0; c++) {
+    const PetscInt d = (c + 1) % 3, e = (c + 2) % 3;
+    const PetscReal turn = on->all.moment[c] - (s->centre[d] * F[e] - s->centre[e] * F[d]);
+
+    most = PetscMax(most, PetscAbsReal(F[c]) / size);
+    if (f->fe->formulation != HYCO_AXISYMMETRIC && (f->fe->dim == 3 || (f->fe->dim == 2 && c == 2)) && turns > 0 &&
+        !f->part->ties)
+      most = PetscMax(most, PetscAbsReal(turn) / turns);
+  }
+  return most;
+}
+
+/* Sums over the ranks, and the imbalance of the bodies. Collective. */
 static PetscErrorCode Balance(HycoFOM f, PetscInt n, Sums *s, PetscReal *balance)
 {
-  PetscReal *sum, most = 0, size;
+  const PetscInt n_bodies = f->scene->n_bodies;
+  PetscReal force = 0, moment = 0, size;
+  PetscInt at = 0;
+  PetscReal *sum;
   Vec terms;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(6 * n + 1, &sum));
-  for (PetscInt k = 0; k < 6 * n; k++)
-    sum[k] = k % 6 < 3 ? s->result[k / 6].force[k % 6] : s->result[k / 6].moment[k % 6 - 3];
-  /* In the same reduction. */
-  sum[6 * n] = s->size;
-  HycoAllreduce(sum, 6 * n + 1, MPIU_REAL, MPI_SUM, HycoComm(f));
-  for (PetscInt k = 0; k < n; k++) {
-    PetscCall(PetscArraycpy(s->result[k].force, sum + 6 * k, 3));
-    PetscCall(PetscArraycpy(s->result[k].moment, sum + 6 * k + 3, 3));
-  }
-  for (PetscInt c = 0; c < 3; c++) {
-    PetscReal rest = 0;
+  PetscCall(PetscMalloc1(6 * n + 8 * n_bodies, &sum));
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    at = 0;
+    for (PetscInt k = 0; k < n + n_bodies; k++) {
+      HycoReaction *r = k < n ? &s->result[k] : &s->body[k - n].all;
 
-    for (PetscInt k = 0; k < n; k++) rest += s->result[k].force[c];
-    most = PetscMax(most, PetscAbsReal(rest));
+      for (PetscInt c = 0; c < 3; c++, at += 2) {
+        if (pass)
+          r->force[c] = sum[at], r->moment[c] = sum[at + 1];
+        else
+          sum[at] = r->force[c], sum[at + 1] = r->moment[c];
+      }
+    }
+    for (PetscInt b = 0; b < n_bodies; b++, at += 2) {
+      OnBody *on = &s->body[b];
+
+      if (pass)
+        on->size = sum[at], on->turns = sum[at + 1];
+      else
+        sum[at] = on->size, sum[at + 1] = on->turns;
+    }
+    /* All in one reduction. */
+    if (!pass) HycoAllreduce(sum, at, MPIU_REAL, MPI_SUM, HycoComm(f));
+  }
+  PetscCall(PetscFree(sum));
+  for (PetscInt b = 0; b < n_bodies; b++) {
+    force += s->body[b].size;
+    moment += s->body[b].turns;
   }
   PetscCall(VecDuplicate(f->U, &terms));
   PetscCall(MatGetDiagonal(f->K, terms));
   PetscCall(VecPointwiseMult(terms, terms, f->U));
   PetscCall(VecNorm(terms, NORM_1, &size));
   PetscCall(VecDestroy(&terms));
+  *balance = 0;
   /* Without any force all of them are round-off of the displacements. */
-  *balance = sum[6 * n] > HYCO_NOTHING * size ? most / sum[6 * n] : 0;
-  PetscCall(PetscFree(sum));
+  for (PetscInt b = 0; b < n_bodies && force > HYCO_NOTHING * size; b++)
+    *balance = PetscMax(*balance, Left(f, s, b, force, moment));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The middle of the nodes' extents. Collective. */
+static PetscErrorCode FindCentre(HycoFOM f, PetscReal centre[3])
+{
+  PetscReal end[6];
+
+  PetscFunctionBegin;
+  for (PetscInt c = 0; c < 6; c++) end[c] = PETSC_MIN_REAL;
+  for (PetscInt i = 0; i < 3 * f->part->n_nodes; i++) {
+    end[i % 3] = PetscMax(end[i % 3], f->fe->X[i]);
+    end[3 + i % 3] = PetscMax(end[3 + i % 3], -f->fe->X[i]);
+  }
+  HycoAllreduce(end, 6, MPIU_REAL, MPI_MAX, HycoComm(f));
+  for (PetscInt c = 0; c < 3; c++) centre[c] = (end[c] - end[3 + c]) / 2;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -281,9 +355,14 @@ PetscErrorCode HycoFOMGetReactions(HycoFOM f, PetscInt *n, const HycoReaction *r
   PetscCall(PetscMalloc2(3 * n_dof, &work, n_dof, &support));
   s.result = f->reaction;
   s.u = f->u;
+  PetscCall(PetscMalloc1(scene->n_bodies, &s.part));
+  PetscCall(PetscCalloc1(scene->n_bodies, &s.body));
+  PetscCall(HycoJoinBodies(HycoComm(f), scene, f->part, s.part));
+  PetscCall(FindCentre(f, s.centre));
   PetscCall(AddUp(f, work, support, &s));
   PetscCall(PetscFree2(work, support));
   PetscCall(Balance(f, all, &s, balance));
+  HycoFreeAll(&s.part, &s.body);
   for (PetscInt k = 0; k < all; k++) {
     HycoReaction *r = &f->reaction[k];
 

@@ -113,13 +113,14 @@ static PetscBool StayFree(HycoScene scene, PetscInt dim, PetscInt n, const HycoR
   return stay;
 }
 
-/* Keeps the motions of parts whose bodies are in no other part. of: n x n_bodies. */
+/* Keeps the motions of parts whose bodies are in no other part. of: n x n_bodies. *moves: parameters change them. */
 static void KeepMotions(HycoReducer t, HycoMotions *motions, const PetscInt first[], const PetscInt last[],
-                        PetscInt of[])
+                        PetscInt of[], PetscBool *moves)
 {
   const PetscInt n_bodies = t->scene->n_bodies;
   PetscInt kept = 0, n;
 
+  *moves = PETSC_FALSE;
   for (PetscInt k = 0; k < motions->n; k += n) {
     const PetscInt part = motions->rigid[k].part;
     PetscBool whole = PETSC_TRUE;
@@ -128,7 +129,8 @@ static void KeepMotions(HycoReducer t, HycoMotions *motions, const PetscInt firs
     /* A body in two parts would have the motion in one of them alone, which no row of bodies can say. */
     for (PetscInt b = 0; b < n_bodies; b++)
       whole = (PetscBool)(whole && (first[b] == last[b] || first[b] > part || last[b] < part));
-    if (!whole || !StayFree(t->scene, t->sizes[3], n, motions->rigid + k)) continue;
+    if (!whole) continue;
+    *moves = (PetscBool)(*moves || !StayFree(t->scene, t->sizes[3], n, motions->rigid + k));
     /* In place: kept never overtakes k. */
     for (PetscInt j = 0; j < n; j++, kept++) {
       motions->rigid[kept] = motions->rigid[k + j];
@@ -138,28 +140,59 @@ static void KeepMotions(HycoReducer t, HycoMotions *motions, const PetscInt firs
   motions->n = kept;
 }
 
+/* Marks the cells of these bodies around supports and springs, and one more of each body: from them predictions find the
+   motions again, where the nodes are then. */
+static PetscErrorCode MarkSupports(HycoReducer t, const PetscBool moved[], PetscBool needed[])
+{
+  const HycoScene s = t->scene;
+  HycoMesh part = t->fom->part;
+  PetscBool *node, *one;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(part->n_nodes, &node));
+  HycoDuplicate(s->n_bodies, moved, &one);
+  for (PetscInt k = 0; k < s->n_fixed + s->n_springs; k++) {
+    const PetscBool fixed = (PetscBool)(k < s->n_fixed);
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(part, fixed ? "fixed" : "spring",
+                                fixed ? s->fixed[k].group : s->spring[k - s->n_fixed].group, &g));
+    for (PetscInt j = part->group_start[g]; j < part->group_start[g + 1]; j++) node[part->group_node[j]] = PETSC_TRUE;
+  }
+  for (PetscInt k = 0; k < part->n_cells * part->nv; k++) {
+    const PetscInt e = k / part->nv, body = part->cell_body[e];
+
+    if (!moved[body] || !(node[part->cells[k]] || one[body])) continue;
+    needed[e] = PETSC_TRUE;
+    one[body] = PETSC_FALSE;
+  }
+  HycoFreeAll(&node, &one);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* With the motions found. needed[] is filled on each rank for its own cells; the mesh of them is on rank 0 only. */
 static PetscErrorCode Take(HycoReducer t, HycoMotions *motions, HycoROM m)
 {
   HycoMesh part = t->fom->part, loaded = NULL;
   const PetscInt n = t->scene->n_bodies;
   PetscInt *first, *last, *of;
-  PetscBool *moved, *needed;
+  PetscBool *moved, *needed, moves = PETSC_FALSE;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc4(n, &first, n, &last, motions->n * n, &of, n, &moved));
   PetscCall(PetscMalloc1(part->n_cells, &needed));
   ierr = PartsOfBodies(t, motions, first, last);
-  if (!ierr) KeepMotions(t, motions, first, last, of);
+  if (!ierr) KeepMotions(t, motions, first, last, of, &moves);
   for (PetscInt k = 0; k < motions->n * n; k++) moved[k % n] = (PetscBool)(moved[k % n] || of[k]);
   if (!ierr && motions->n) {
     /* Only cells with loads on bodies that move: the balance needs no others. */
     HycoOnEach(HycoComm(t), HycoMarkLoads(t->scene, part, moved, needed));
+    if (moves) HycoOnEach(HycoComm(t), MarkSupports(t, moved, needed));
     PetscCall(HycoReducerGatherMesh(t, needed, &loaded));
   }
   if (loaded && !loaded->n_cells) PetscCall(HycoMeshDestroy(&loaded));
-  if (m && motions->n) ierr = HycoFloatingCreate(motions->n, motions->rigid, n, of, loaded, &m->model->floating);
+  if (m && motions->n) ierr = HycoFloatingCreate(motions->n, motions->rigid, n, of, moves, loaded, &m->model->floating);
   PetscCall(PetscFree4(first, last, of, moved));
   PetscCall(PetscFree(needed));
   PetscCall(ierr);

@@ -5,9 +5,7 @@
 */
 #include <hycoquantities.h>
 
-/* part[b]: the first of the bodies that share nodes with body b or are tied to it, directly or by others. Collective.
- */
-static PetscErrorCode JoinBodies(MPI_Comm comm, HycoScene scene, HycoMesh m, PetscInt part[])
+PetscErrorCode HycoJoinBodies(MPI_Comm comm, HycoScene scene, HycoMesh m, PetscInt part[])
 {
   const PetscInt n = scene->n_bodies;
   PetscBool *joined, change = PETSC_TRUE;
@@ -136,7 +134,7 @@ PetscErrorCode HycoQuantitiesBalance(MPI_Comm comm, HycoScene scene, HycoMesh m,
   PetscCall(PetscMalloc1(n, &part));
   PetscCall(PetscCalloc1(2 * scene->n_quantities * n, &held));
   /* Bodies that are tied to each other have one balance: forces between them are not known one by one. */
-  PetscCall(JoinBodies(comm, scene, m, part));
+  PetscCall(HycoJoinBodies(comm, scene, m, part));
   HycoOnEach(comm, MarkAll(scene, m, part, held));
   /* Each rank sees the nodes of its part alone, and a group may be on several. */
   HycoAllreduce(held, 2 * scene->n_quantities * n, HYCO_MPI_BOOL, MPI_LOR, comm);

@@ -64,7 +64,7 @@ static const HycoMember prediction[] = {
   F(rid_fraction), F(covered_force), F(total_contact_force), F(lambda_max), F(lambda_norm2), F(u_norm2), F(u_min),
   F(u_max), F(quantity), F(condition), F(path_quantity), F(path_force), F(path_mises), F(path_inelastic), F(residual),
   F(contact_residual), F(estimated_error_u), F(estimated_error_sigma), F(estimated_error_lambda),
-  F(estimated_error_quantity), F(inconsistency), F(inconsistent), F(unseen),
+  F(estimated_error_quantity), F(inconsistency), F(inconsistent), F(balance), F(unbalanced), F(unseen),
   F(unseen_feature), F(beyond), F(gives_forces), F(interpolation_error), F(kkt.stationarity), F(kkt.penetration),
   F(kkt.adhesion), F(kkt.complementarity), F(kkt.rounding), F(method), F(reason), F(seconds.setup),
   F(seconds.assemble), F(seconds.factor), F(seconds.solve), F(seconds.total), F(n_dependent), F(loose),

@@ -59,6 +59,7 @@ static const PetscReal slight[HYCO_FEATURES] = {1e-6, 1e-6, 1e-3, 0, 0, 1e-7, 0.
 #define MOST_FACTOR  100  /* of the estimates in a new regime */
 #define INCONSISTENT 1e-3 /* smaller differences are none in practice; */
 #define UNJUDGED     1e-2 /* likewise in a model without held-out points */
+#define UNBALANCED   1e-8 /* forces that balance to it are those that balance but for round-off */
 
 /* Of sums of squares; x / 0 counts as 1, a full error, and stays finite for the formulas. */
 static PetscReal Quotient(PetscReal part2, PetscReal size2)
@@ -358,27 +359,14 @@ static PetscReal UnseenFactor(HycoROM m, HycoPrediction *p, const PetscReal feat
   return *torn ? 1 : PetscMin(p->unseen, MOST_FACTOR);
 }
 
-/* First everything is set to "not known", so that every early end leaves a valid prediction. */
-PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
+/* From the features of the prediction; nearest: the point of the region of training. */
+static PetscErrorCode EvaluateFeatures(HycoROM m, const PetscReal nearest[], HycoPrediction *p)
 {
   const HycoEstimates *t = &m->model->estimates;
-  PetscReal nearest[HYCO_MAX_PARAMETERS], feature[HYCO_FEATURES], outside;
+  PetscReal feature[HYCO_FEATURES], outside;
   PetscBool torn;
 
   PetscFunctionBegin;
-  for (PetscInt q = 0; q < HYCO_MAX_QUANTITIES; q++) p->estimated_error_quantity[q] = -1;
-  p->estimated_error_u = p->estimated_error_lambda = p->estimated_error_sigma = -1;
-  p->inconsistency = -1;
-  p->inconsistent = PETSC_FALSE;
-  p->unseen = 1;
-  p->unseen_feature = -1;
-  PetscCall(FindReach(m));
-  /* Reported whether or not there are estimates. */
-  p->beyond = Beyond(m, m->fe->mu, nearest);
-  m->stretch = 1;
-  if (p->reason > 0) PetscTryTypeMethod(m, estimate, p);
-  /* Features of forces outside the RID need the reconstruction. */
-  if (p->reason <= 0 || (m->ops->reconstruct && !m->reconstruct)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoEstimatesFeatures(m, feature));
   p->inconsistency = feature[INCONSISTENCY];
   p->inconsistent = IsInconsistent(m, p->inconsistency);
@@ -403,11 +391,40 @@ PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
   for (PetscInt q = 0; p->loose && q < m->model->scene->n_quantities; q++) {
     if (HycoQuantityOfPosition(&m->model->scene->quantity[q])) p->estimated_error_quantity[q] = -1;
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* First everything is set to "not known", so that every early end leaves a valid prediction. */
+PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
+{
+  PetscReal nearest[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  for (PetscInt q = 0; q < HYCO_MAX_QUANTITIES; q++) p->estimated_error_quantity[q] = -1;
+  p->estimated_error_u = p->estimated_error_lambda = p->estimated_error_sigma = -1;
+  p->inconsistency = -1;
+  p->balance = p->reason > 0 ? m->imbalance : -1;
+  p->inconsistent = p->unbalanced = PETSC_FALSE;
+  p->unseen = 1;
+  p->unseen_feature = -1;
+  PetscCall(FindReach(m));
+  /* Reported whether or not there are estimates. */
+  p->beyond = Beyond(m, m->fe->mu, nearest);
+  m->stretch = 1;
+  if (p->reason > 0) PetscTryTypeMethod(m, estimate, p);
+  /* Features of forces outside the RID need the reconstruction. */
+  if (p->reason <= 0 || (m->ops->reconstruct && !m->reconstruct)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(EvaluateFeatures(m, nearest, p));
+  /* Forces that had to be changed so much to balance, or do not balance, are wrong by about that. */
+  p->unbalanced =
+      (PetscBool)(p->balance >
+                  PetscMax(UNBALANCED, p->estimated_error_lambda < 0 ? UNJUDGED : p->estimated_error_lambda));
+  if (p->estimated_error_lambda >= 0)
+    p->estimated_error_lambda = PetscMax(p->estimated_error_lambda, PetscMax(m->corrected, m->imbalance));
   /* Full order may find other nodal forces, as far away as they are. */
   if (p->n_dependent > 0) p->estimated_error_lambda = -1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
 /* "u 1.2e-04, stress 3e-03, contact forces 2e-02" */
 static void DescribeErrors(const PetscReal error[], char text[HYCO_LINE])
 {

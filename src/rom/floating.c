@@ -14,6 +14,7 @@ struct _n_HycoFloating {
   PetscInt n; /* rigid motions */
   HycoRigid *rigid;
   PetscInt n_bodies, *of; /* n x n_bodies: whether a motion moves a body */
+  PetscInt moves;         /* the motions depend on the parameters: `rigid` has those of the training */
   HycoMesh mesh;          /* the cells with the loads of these bodies; NULL: there are none */
 };
 
@@ -32,7 +33,7 @@ PetscErrorCode HycoFloatingDestroy(HycoFloating *floating)
 /* f->mesh is set first, so that HycoFloatingDestroy() frees it after an error. Takes over `loaded`; rigid[] and of[]
    are copied. */
 PetscErrorCode HycoFloatingCreate(PetscInt n, const HycoRigid rigid[], PetscInt n_bodies, const PetscInt of[],
-                                  HycoMesh loaded, HycoFloating *floating)
+                                  PetscBool moves, HycoMesh loaded, HycoFloating *floating)
 {
   HycoFloating f;
 
@@ -40,6 +41,7 @@ PetscErrorCode HycoFloatingCreate(PetscInt n, const HycoRigid rigid[], PetscInt 
   PetscCall(PetscNew(floating));
   f = *floating;
   f->mesh = loaded;
+  f->moves = moves;
   f->n = n;
   f->n_bodies = n_bodies;
   HycoDuplicate(n, rigid, &f->rigid);
@@ -79,6 +81,8 @@ PetscErrorCode HycoFloatingMove(HycoH5 h, HycoROM m)
   /* of[] is a table, motions x bodies. */
   f->n_bodies = m->model->scene->n_bodies;
   PetscCall(HycoH5Int(h, "floating/bodies", 0, 1, &f->n, f->n_bodies, &f->of));
+  if (reads ? HycoH5Has(h, "floating/moves") == PETSC_TRUE : f->moves != 0)
+    PetscCall(HycoH5Ints(h, "floating/moves", 0, 1, 1, &f->moves));
   if (reads ? !HycoH5Has(h, "floating/mesh/head") : !f->mesh) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoMeshMove(h, "floating/mesh", f->n_bodies, &f->mesh));
   /* Ties belong to the scene's mesh and are not stored twice. */
@@ -88,31 +92,84 @@ PetscErrorCode HycoFloatingMove(HycoH5 h, HycoROM m)
 }
 
 /* Component c of motion j at node i of fe's mesh, in the unknowns there: zero where one is fixed. */
-static PetscReal At(HycoFloating f, HycoFE fe, PetscInt j, PetscInt i, PetscInt c)
+static PetscReal At(HycoROM m, HycoFE fe, PetscInt j, PetscInt i, PetscInt c)
 {
+  const HycoFloating f = m->model->floating;
+
   if (fe->fixed[i * fe->dim + c] || !f->of[j * f->n_bodies + fe->mesh->node_body[i]]) return 0;
-  return HycoRigidAt(&f->rigid[j], fe->dim, fe->X + 3 * i, c);
+  return HycoRigidAt(f->moves ? &m->rigid[j] : &f->rigid[j], fe->dim, fe->X + 3 * i, c);
 }
 
-/* work[n]: of the loads at mu. The balance holds at every mu, and so does the work of the loads along a rigid motion,
-   without any elastic solve. */
-static PetscErrorCode LoadWork(HycoROM m, HycoFloating f, const PetscReal mu[], PetscReal work[])
+/* The first motion that moves a body, which is that of its connected part; -1: none does. */
+static PetscInt PartOf(HycoFloating f, PetscInt body)
+{
+  for (PetscInt j = 0; j < f->n; j++) {
+    if (f->of[j * f->n_bodies + body]) return j;
+  }
+  return -1;
+}
+
+/* The motions at fe_floating's parameters; *found: there are as many of each part as in training. */
+static PetscErrorCode MoveMotions(HycoROM m, HycoFloating f, PetscBool *found)
+{
+  HycoMesh mesh = f->mesh;
+  PetscInt *part, n = 0;
+  HycoMotions motions;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  *found = PETSC_TRUE;
+  if (!f->moves) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!m->rigid) PetscCall(PetscMalloc1(f->n, &m->rigid));
+  PetscCall(PetscMalloc1(mesh->n_nodes, &part));
+  for (PetscInt i = 0; i < mesh->n_nodes; i++) {
+    part[i] = PartOf(f, mesh->node_body[i]);
+    if (part[i] < 0) part[i] = f->n; /* nodes of other bodies, whose motions are none of these */
+  }
+  ierr = HycoFEMotionsOfParts(m->fe_floating, f->n + 1, part, &motions);
+  PetscCall(PetscFree(part));
+  PetscCall(ierr);
+  for (PetscInt k = 0; k < motions.n; k++) {
+    const PetscInt of = motions.rigid[k].part;
+
+    if (of == f->n) continue;
+    for (PetscInt b = 0; b < f->n_bodies && *found; b++)
+      *found = (PetscBool)(n < f->n && (PartOf(f, b) == of) == (f->of[n * f->n_bodies + b] != 0));
+    if (*found) m->rigid[n++] = motions.rigid[k];
+  }
+  *found = (PetscBool)(*found && n == f->n);
+  PetscCall(HycoMotionsDestroy(&motions));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* work[n]: of the loads at mu, size[n]: of its terms. The balance holds at every mu, and so does the work of the loads
+   along a rigid motion, without any elastic solve. *found: the motions are there. */
+static PetscErrorCode LoadWork(HycoROM m, HycoFloating f, const PetscReal mu[], PetscReal work[], PetscReal size[],
+                               PetscBool *found)
 {
   PetscReal *load;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(work, f->n));
+  PetscCall(PetscArrayzero(size, f->n));
+  *found = PETSC_TRUE;
   if (!f->mesh) PetscFunctionReturn(PETSC_SUCCESS);
   if (!m->fe_floating) PetscCall(HycoFECreate(m->model->scene, f->mesh->dm, &m->fe_floating));
   PetscCall(HycoFESetParameters(m->fe_floating, mu));
+  PetscCall(MoveMotions(m, f, found));
+  if (!*found) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(m->fe_floating->n_dof, &load));
   ierr = HycoFELoads(m->fe_floating, load);
   if (!ierr) HycoFEGeneralise(m->fe_floating, load);
   for (PetscInt k = 0; !ierr && k < m->fe_floating->n_dof; k++) {
     /* The mesh has all cells with loads of these bodies, so that its nodal loads are complete. */
-    for (PetscInt j = 0; load[k] != 0 && j < f->n; j++)
-      work[j] += load[k] * At(f, m->fe_floating, j, k / m->fe_floating->dim, k % m->fe_floating->dim);
+    for (PetscInt j = 0; load[k] != 0 && j < f->n; j++) {
+      const PetscReal term = load[k] * At(m, m->fe_floating, j, k / m->fe_floating->dim, k % m->fe_floating->dim);
+
+      work[j] += term;
+      size[j] += PetscAbsReal(term);
+    }
   }
   PetscCall(PetscFree(load));
   PetscCall(ierr);
@@ -127,7 +184,7 @@ typedef struct {
 } Dual;
 
 /* The part of friction in the work of contact k on motion j, for a normal force of 1. */
-static PetscReal FrictionWork(HycoROM m, HycoFloating f, HycoFE fe, PetscInt j, PetscInt k)
+static PetscReal FrictionWork(HycoROM m, HycoFE fe, PetscInt j, PetscInt k)
 {
   const PetscInt *master;
   const PetscReal *weight;
@@ -138,15 +195,15 @@ static PetscReal FrictionWork(HycoROM m, HycoFloating f, HycoFE fe, PetscInt j, 
   for (PetscInt c = 0; c < fe->dim; c++) {
     const PetscReal force = m->pairs.shear->force[3 * k + c] / m->Lambda[k];
 
-    work -= force * At(f, fe, j, m->pairs.slave[k], c);
-    for (PetscInt i = 0; i < n; i++) work += force * weight[i] * At(f, fe, j, master[i], c);
+    work -= force * At(m, fe, j, m->pairs.slave[k], c);
+    for (PetscInt i = 0; i < n; i++) work += force * weight[i] * At(m, fe, j, master[i], c);
   }
   return work;
 }
 
 /* The work of each pressing contact's row of B, or of its force with friction, on the floating bodies' rigid motions,
    a column per contact. */
-static PetscErrorCode FillDual(HycoROM m, HycoFloating f, HycoFE fe, Dual *d)
+static PetscErrorCode FillDual(HycoROM m, HycoFE fe, Dual *d)
 {
   PetscFunctionBegin;
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
@@ -157,9 +214,9 @@ static PetscErrorCode FillDual(HycoROM m, HycoFloating f, HycoFE fe, Dual *d)
     PetscCall(PetscArrayzero(work, d->p));
     for (PetscInt e = m->rows.start[k]; e < m->rows.start[k + 1]; e++) {
       for (PetscInt j = 0; j < d->p; j++)
-        work[j] += m->rows.value[e] * At(f, fe, j, m->rows.dof[e] / fe->dim, m->rows.dof[e] % fe->dim);
+        work[j] += m->rows.value[e] * At(m, fe, j, m->rows.dof[e] / fe->dim, m->rows.dof[e] % fe->dim);
     }
-    for (PetscInt j = 0; m->pairs.shear && j < d->p; j++) work[j] += FrictionWork(m, f, fe, j, k);
+    for (PetscInt j = 0; m->pairs.shear && j < d->p; j++) work[j] += FrictionWork(m, fe, j, k);
     d->contact[d->n++] = k;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -243,25 +300,45 @@ static PetscErrorCode Minimise(const Dual *d, PetscReal c[], PetscBool *met)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What the forces' works miss of the loads' (size: of their terms), relative to the terms of each. */
+static PetscReal Imbalance(const Dual *d, const PetscReal size[])
+{
+  PetscReal most = 0;
+
+  for (PetscInt j = 0; j < d->p; j++) {
+    PetscReal sum = -d->load[j], terms = size[j];
+
+    for (PetscInt k = 0; k < d->n; k++) {
+      const PetscReal work = d->force[d->contact[k]] * d->work[k * d->p + j];
+
+      sum += work;
+      terms += PetscAbsReal(work);
+    }
+    if (terms > 0) most = PetscMax(most, PetscAbsReal(sum) / terms);
+  }
+  return most;
+}
+
 /* Forces are multiplied by positive factors, so that open contacts stay open and none pulls. */
 PetscErrorCode HycoFloatingBalance(HycoROM m)
 {
   HycoFloating f = m->model->floating;
   Dual d = {0};
   HycoFE fe;
-  PetscReal *load, *c;
-  PetscBool met = PETSC_FALSE;
+  PetscReal *load, *size, *c;
+  PetscBool met = PETSC_FALSE, found;
 
   PetscFunctionBegin;
   if (!f || !HycoROMHasAllForces(m)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoROMBringContacts(m, &fe));
-  PetscCall(PetscMalloc4(f->n, &load, f->n, &c, m->model->pairs.n, &d.contact, (size_t)m->model->pairs.n * (size_t)f->n,
-                         &d.work));
+  PetscCall(PetscMalloc5(f->n, &load, f->n, &size, f->n, &c, m->model->pairs.n, &d.contact,
+                         (size_t)m->model->pairs.n * (size_t)f->n, &d.work));
   d.p = f->n;
   d.force = m->Lambda;
   d.load = load;
-  PetscCall(LoadWork(m, f, m->fe->mu, load));
-  PetscCall(FillDual(m, f, fe, &d));
+  PetscCall(LoadWork(m, f, m->fe->mu, load, size, &found));
+  if (found) PetscCall(FillDual(m, fe, &d));
+  if (found) m->corrected = PetscMax(m->corrected, Imbalance(&d, size));
   if (d.n) PetscCall(Minimise(&d, c, &met));
   /* Only if all works agree: forces in between would be neither the model's nor in balance. */
   for (PetscInt k = 0; met && k < d.n; k++) {
@@ -270,6 +347,7 @@ PetscErrorCode HycoFloatingBalance(HycoROM m)
     for (PetscInt j = 0; j < d.p; j++) power += c[j] * d.work[k * d.p + j];
     m->Lambda[d.contact[k]] *= PetscExpReal(power);
   }
-  PetscCall(PetscFree4(load, c, d.contact, d.work));
+  if (found) m->imbalance = PetscMax(m->imbalance, Imbalance(&d, size));
+  PetscCall(PetscFree5(load, size, c, d.contact, d.work));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

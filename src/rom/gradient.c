@@ -50,6 +50,7 @@ typedef struct {
 static PetscErrorCode Move(Work *o, const PetscReal mu[], const PetscReal z[])
 {
   HycoROM m = o->m;
+  const PetscReal imbalance = m->imbalance, corrected = m->corrected;
   PetscReal size;
 
   PetscFunctionBegin;
@@ -57,6 +58,9 @@ static PetscErrorCode Move(Work *o, const PetscReal mu[], const PetscReal z[])
   PetscUseTypeMethod(m, expand);
   if (m->ops->reconstruct && m->reconstruct) PetscCall((*m->ops->reconstruct)(m));
   PetscCall(HycoFloatingBalance(m));
+  /* Those of the prediction. */
+  m->imbalance = imbalance;
+  m->corrected = corrected;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -93,6 +93,7 @@ PetscErrorCode HycoROMPredict(HycoROM m, PetscInt n, const PetscReal mu[])
   p->seconds.setup = HycoNow() - begin;
   begin = HycoNow();
   m->remainder = 0;
+  m->imbalance = m->corrected = -1;
   p->loose = PETSC_FALSE;
   p->why[0] = '\0';
   PetscUseTypeMethod(m, solve, mu);
@@ -171,6 +172,6 @@ PetscErrorCode HycoROMReset(HycoROM m)
   m->of_fe = NULL;
   PetscCall(HycoROMDropPairs(&m->pairs));
   PetscCall(HycoTraceFree(m));
-  HycoFreeAll(&m->contact, &m->gamma, &m->U, &m->Lambda, &m->stress, &m->slave_id, &m->modal);
+  HycoFreeAll(&m->contact, &m->gamma, &m->U, &m->Lambda, &m->stress, &m->slave_id, &m->modal, &m->rigid);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -387,7 +387,7 @@ class Bodies(Case):
 
     def test_reshaped(self):
         """Bodies that contact alone holds, of which parameters change height, lean, angle and width: forces within the bound, those that balance
-        the loads to round-off, and derivatives as differences of predictions."""
+        the loads to round-off, also in a projection-based model, and derivatives as differences of predictions."""
         for name, (scene, geo), mu in (('foot', FOOT, (14.3, 1.3, 120)), ('wedge', WEDGE, (13.1, 1.07))):
             with self.subTest(name=name):
                 self.drawn(name, 2, geo, scene)
@@ -397,6 +397,12 @@ class Bodies(Case):
                 if name == 'foot':
                     half = 10*1.1
                     self.near(p['outputs']['push'], 2*half*mu[2]*(1 + 0.2*mu[1]/10), 1e-12)
+                    self.hyco('train', '-scene', name, '-scatter', '6', '-hyco_model_type', 'projection', '-hyco_pod_tol', '1e-7', '-hyco_validation', '0',
+                              '-hyco_snapshots', 'h.snapshots', '-model', 'h.h5')
+                    h = self.hyco('predict', '-model', 'h.h5', '-mu', ','.join(map(repr, mu)))
+                    self.near(h['outputs']['push'], p['outputs']['push'], 1e-9)
+                    for balance in (p['balance'], h['balance'], self.hyco('solve', '-scene', name, '-mu', ','.join(map(repr, mu)))['balance']):
+                        self.assertLess(balance, 1e-11)
                     # about the origin, of load*(1 + 0.02 x) over the top, -11 + lean to 11 + lean, and of the support there
                     self.near(p['outputs']['tilt'], mu[2]*(2*half*mu[1] + 0.02*(2*half*mu[1]**2 + 2*half**3/3)) + mu[0]*p['outputs']['side'], 1e-12)
                 else:

@@ -131,7 +131,9 @@ class Balance(Case):
                     self.assertLess(abs(model[name] - full[name]), 1e-2 * 1.7, name)
                 self.sums(model, 'plane', 1.7, follows)
         self.hyco('train', '-scene', scene, '-grid', '3,3', '-model', 'part.h5', '-hyco_model_type', 'hybrid', '-hyco_snapshots', f'{k}.h5.snapshots')
-        part = self.hyco('predict', '-model', 'part.h5', *at, '-hyco_reconstruct', 'false')['outputs']
+        part = self.hyco('predict', '-model', 'part.h5', *at, '-hyco_reconstruct', 'false')
+        self.assertIsNone(part['balance'])  # supports carry whatever is left
+        part = part['outputs']
         self.assertIsNone(part['carry'])
         self.near(part['both'], full['both'], 1e-9)
 
@@ -159,6 +161,7 @@ class Balance(Case):
                     self.assertGreater(force, 10)
                     self.near(found['floor_y'] + found['ceiling_y'], float(mu.split(',')[3]), 1e-9)
                     self.assertLess(abs(sum(found[name + '_x'] for name in ('shaft_r', 'shaft_l', 'hub_r', 'hub_l'))), 1e-9 * force)
+                    self.assertLess(at['balance'], 1e-9)
 
 
 if __name__ == '__main__':

@@ -160,6 +160,7 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
   PetscCall(HycoBodiesSolve(o, &s, mu, m->Lambda, &solved));
   PetscCall(ExpandAll(m));
   HycoBodiesMeasure(m, &p->kkt);
+  m->imbalance = HycoBodiesImbalance(o);
   /* The bound of theory.md: from the samples' error e and the present forces; 0 where nothing is interpolated. */
   p->interpolation_error = HycoBodiesBound(o, &norm);
   PetscCall(HycoBodiesLoose(o, m->model->pairs.n, m->Lambda, &p->loose));

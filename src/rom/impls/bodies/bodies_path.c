@@ -230,6 +230,7 @@ static PetscErrorCode Record(HycoPath p)
   w->misfit = PetscMax(w->misfit, Misfit(m, alpha));
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
   PetscCall(HycoTraceRecord(m, PETSC_TRUE, p->begin, &p->now));
+  m->imbalance = PetscMax(m->imbalance, HycoBodiesImbalance(&w->bodies));
   if (w->friction) PetscCall(RecordFriction(m, &p->now));
   loose = &m->trace.loose[m->trace.n_listed - 1];
   if (w->friction)

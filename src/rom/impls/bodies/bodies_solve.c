@@ -1099,6 +1099,27 @@ PetscReal HycoBodiesUnbalanced(HycoBodiesWork o)
   return most;
 }
 
+PetscReal HycoBodiesImbalance(HycoBodiesWork o)
+{
+  const HycoSubstructures b = o->bodies;
+  PetscReal most = b->p ? 0 : -1;
+
+  for (PetscInt i = 0; i < b->p; i++) {
+    PetscReal sum = 0, terms = 0;
+
+    for (PetscInt j = 0; j < b->r; j++) {
+      sum += o->work[i * b->r + j] * o->c[j];
+      terms += PetscAbsReal(o->work[i * b->r + j] * o->c[j]);
+    }
+    for (PetscInt k = 0; k < b->ns; k++) {
+      sum -= o->Z[k * b->p + i] * o->f[k];
+      terms += PetscAbsReal(o->Z[k * b->p + i] * o->f[k]);
+    }
+    if (terms > 0) most = PetscMax(most, PetscAbsReal(sum) / terms);
+  }
+  return most;
+}
+
 #define HOLDS 1e-10 /* share of the largest force below which a force is round-off */
 
 void HycoBodiesMotionRow(HycoBodiesWork o, PetscInt k, PetscReal g[])
