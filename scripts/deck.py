@@ -403,6 +403,9 @@ class Draft:
             reach = block.parameters.get("POSITION TOLERANCE")
             if both:
                 self.ties[self.free_name(block.parameters.get("NAME", "tie"), self.ties)] = (*both, real(reach) if reach else None)
+                far = self.reach(*both) if block.parameters.get("ADJUST", "").upper() == "NO" else None
+                if far and far[0] > 1e-6 * far[1]:
+                    self.leave(block, "*TIE, ADJUST=NO of surfaces with a gap", "tied nodes are moved onto the master, without strain")
 
     def on_rigid_body(self, block):
         p = block.parameters
@@ -824,6 +827,8 @@ class Draft:
         given = bool(block.rows) and interaction is not None and not self.steps
         if given:
             interaction["friction"] = item(block.rows[0], 0)
+            if item(block.rows[0], 1) and not self.frictionless:
+                self.note(f"{block.place}: *FRICTION: the stiffness {block.rows[0][1]} of contacts that stick is taken as a penalty; they stick without slip")
         if self.frictionless:
             self.leave(block, "*FRICTION", "left out by --frictionless; the coefficient stands beside the contact")
         elif not given or len(block.rows) > 1:

@@ -555,6 +555,8 @@ class Decks(Case):
         self.assertEqual(['in plane stress' in line for line in left], [True])  # the bodies are elastic there
         self.solve(folder)
         self.convert('exchanged', deck([a, b], '*TIE, NAME=T\nB_SZ0, A_SZ1\n*BOUNDARY\nA_Z0, 1, 3\nB_X0, 1, 1\n', [('', '*STATIC\n*DSLOAD\nB_SZ1, P, 3.\n')]))
+        left, _ = self.convert('apart', deck([a, Box('B', 'C3D8', (0, 0, 1.01), (1, 1, 2), (1, 1, 1), 1001)], '*TIE, NAME=T, ADJUST=NO\nB_SZ0, A_SZ1\n*BOUNDARY\nA_Z0, 1, 3\n', [('', '*STATIC\n')]))
+        self.assertEqual(['ADJUST=NO' in line for line in left], [True])
         self.solve(self.path('exchanged'))  # a tied node with a support of its own would be refused
         held = '*BOUNDARY\nA_Y0, 2, 2\n1, 1, 1\n*ELEMENT, TYPE=SPRING1, ELSET=K\n91, 2\n92, 4\n*SPRING, ELSET=K\n2\n7.\n'
         left, folder = self.convert('sprung', deck([flat], held, [('', '*STATIC\n*CLOAD\nA_Y1, 2, 50.\n')], STEEL.replace('210000', '100')))
