@@ -81,6 +81,10 @@ typedef struct {
   PetscBool reduced;               /* the bases are those of the columns */
   HycoROM kept;                    /* the model of the last attempt, if it can be taken as it is; else NULL */
   HycoTraining kept_report;
+  HycoROM former; /* the best model so far, which missed the targets; NULL: none yet */
+  HycoTraining former_report;
+  Mat former_V; /* its modes, as the reducer has those of the last bases, */
+  PetscInt former_l;
   HycoLeftOut left_out[HYCO_MAX_LEFT_OUT];
   PetscInt n_left_out;
   char remedy[HYCO_LINE]; /* of a type that gave no model: HycoReducer's remedy */
@@ -1100,36 +1104,6 @@ static PetscErrorCode TrainOn(Search *s, HycoSamples grown)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Attempts, and solutions added until the targets are met or the budget is used up: in *grown, with the first ones
-   (NULL: none was added; the caller owns it). The list of attempts begins anew with each round; what they have
-   spent adds up, and the budget grows with the solutions. */
-static PetscErrorCode Rounds(Search *s, HycoSamples *grown, HycoTraining *report)
-{
-  HycoReducer t = s->t;
-  const PetscInt budget = t->budget < 0 ? s->first : t->budget;
-  PetscInt by = -1, n;
-
-  PetscFunctionBegin;
-  for (;;) {
-    const PetscInt left = budget - (report->n_added - report->n_former),
-                   n_add = PetscMin(PetscMax(2, s->first / ROUND), left);
-
-    PetscCall(Attempts(s));
-    /* Points are added only for targets: the default limits end with what the user's points give. */
-    if (!s->targets || s->least <= 1 || n_add < 1 || !t->scene->n_parameters || IsOwn(t)) break;
-    PetscCall(BeginGrown(s, grown));
-    PetscCall(AddPoints(s, *grown, n_add, &n, &by));
-    /* Every candidate is a training point already. */
-    if (!n) break;
-    report->n_added += n;
-    /* Held-out points have neighbours now: they judge more kindly than a user's points. */
-    s->near = PETSC_TRUE;
-    if (t->added) HycoOnRoot(HycoComm(t), t->added(n, by, PETSC_FALSE, t->attempt_ctx));
-    PetscCall(TrainOn(s, *grown));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* What would help next if the errors are too large, beside more points. */
 static PetscErrorCode Advise(Search *s, HycoTraining *report)
 {
@@ -1244,6 +1218,142 @@ static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
            (best ? best : &s->attempt[0])->failure);
 }
 
+/* Exchanges the modes of the last bases with those of the former model. */
+static void SwapModes(Search *s)
+{
+  const Mat V = s->t->V;
+  const PetscInt l = s->t->l;
+
+  s->t->V = s->former_V;
+  s->t->l = s->former_l;
+  s->former_V = V;
+  s->former_l = l;
+}
+
+/* The former model becomes this one, with its report and a copy of its modes; or none. */
+static PetscErrorCode SetFormer(Search *s, HycoROM model, const HycoTraining *report)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoROMDestroy(&s->former));
+  PetscCall(MatDestroy(&s->former_V));
+  s->former = model;
+  if (!model) PetscFunctionReturn(PETSC_SUCCESS);
+  s->former_report = *report;
+  s->former_l = s->t->l;
+  if (s->t->V) PetscCall(MatDuplicate(s->t->V, MAT_COPY_VALUES, &s->former_V));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* *worst: the largest quotient of an error and its target at the held-out points. */
+static PetscErrorCode WorstQuotient(Search *s, HycoROM model, PetscReal *worst)
+{
+  HycoHeldOut *rows;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(s->t->held, &n, NULL, NULL));
+  PetscCall(PetscMalloc1(n + 1, &rows));
+  HycoOnError(HycoReducerPredictHeldOut(s->t, s->t->held, model, s->store, NULL, rows), PetscCall(PetscFree(rows)));
+  s->force = HycoHeldOutForce(n, rows);
+  *worst = 0;
+  for (PetscInt k = 0; k < n; k++) *worst = PetscMax(*worst, Quotient(s, &rows[k]));
+  PetscCall(PetscFree(rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of the model (NULL: none) and the former one the better at the present held-out points, which becomes *model with its
+   report. */
+static PetscErrorCode TakeBetter(Search *s, HycoROM *model, HycoTraining *report)
+{
+  HycoReducer t = s->t;
+  PetscReal former, now = PETSC_MAX_REAL;
+
+  PetscFunctionBegin;
+  if (!s->former) PetscFunctionReturn(PETSC_SUCCESS);
+  SwapModes(s);
+  HycoOnError(WorstQuotient(s, s->former, &former), SwapModes(s));
+  SwapModes(s);
+  if (*model) PetscCall(WorstQuotient(s, *model, &now));
+  if (former < now) {
+    const PetscInt n_fresh = report->n_fresh;
+
+    PetscCall(HycoROMDestroy(model));
+    *model = s->former;
+    *report = s->former_report;
+    report->n_fresh = n_fresh;
+    report->n_left_out = s->n_left_out;
+    PetscCall(PetscArraycpy(report->left_out, s->left_out, s->n_left_out));
+    s->former = NULL;
+    SwapModes(s);
+    PetscCall(SetSettings(t, &report->chosen.settings));
+    PetscCall(PetscFree(t->judged_held)); /* of the other */
+  }
+  PetscCall(SetFormer(s, NULL, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Builds the best model before solutions are added: what follows may fail, or give none that is better. */
+static PetscErrorCode KeepBest(Search *s, const HycoTraining *report)
+{
+  HycoROM model = NULL;
+  HycoTraining built = *report;
+  PetscErrorCode ierr;
+  char message[HYCO_LINE] = "";
+
+  PetscFunctionBegin;
+  HycoCatch(BuildBest(s, &model, &built), ierr, message);
+  if (ierr && ierr != HYCO_ERR_NO_MODEL && ierr != PETSC_ERR_USER) SETERRQ(PETSC_COMM_SELF, ierr, "%s", message);
+  if (ierr) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(TakeBetter(s, &model, &built));
+  PetscCall(SetFormer(s, model, &built));
+  PetscCall(PetscFree(s->t->judged_held));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether an error ends the search although it has a model: not of a solve at a point that was added, or of an attempt. */
+static PetscErrorCode Survive(Search *s, PetscErrorCode ierr, const char message[], PetscBool has)
+{
+  char line[HYCO_LINE];
+
+  PetscFunctionBegin;
+  if (!ierr) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!has || (ierr != HYCO_ERR_NO_MODEL && ierr != PETSC_ERR_USER)) SETERRQ(PETSC_COMM_SELF, ierr, "%s", message);
+  HycoFormat(line, "they end with: %s", message);
+  LeaveOut(s, "further solutions", PETSC_FALSE, line);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Attempts, and solutions added until the targets are met or the budget is used up: in *grown, with the first ones
+   (NULL: none was added; the caller owns it). The list of attempts begins anew with each round; what they have
+   spent adds up, and the budget grows with the solutions. */
+static PetscErrorCode Rounds(Search *s, HycoSamples *grown, HycoTraining *report)
+{
+  HycoReducer t = s->t;
+  const PetscInt budget = t->budget < 0 ? s->first : t->budget;
+  PetscInt by = -1, n;
+
+  PetscFunctionBegin;
+  for (;;) {
+    const PetscInt left = budget - (report->n_added - report->n_former),
+                   n_add = PetscMin(PetscMax(2, s->first / ROUND), left);
+
+    PetscCall(Attempts(s));
+    /* Points are added only for targets: the default limits end with what the user's points give. */
+    if (!s->targets || s->least <= 1 || n_add < 1 || !t->scene->n_parameters || IsOwn(t)) break;
+    PetscCall(KeepBest(s, report));
+    PetscCall(BeginGrown(s, grown));
+    PetscCall(AddPoints(s, *grown, n_add, &n, &by));
+    /* Every candidate is a training point already. */
+    if (!n) break;
+    report->n_added += n;
+    /* Held-out points have neighbours now: they judge more kindly than a user's points. */
+    s->near = PETSC_TRUE;
+    if (t->added) HycoOnRoot(HycoComm(t), t->added(n, by, PETSC_FALSE, t->attempt_ctx));
+    PetscCall(TrainOn(s, *grown));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Judges the model at fresh held-out points. met: at these and at the former ones it meets the targets. */
 static PetscErrorCode JudgeFresh(Search *s, HycoROM model, HycoSamples *former, HycoTraining *report, PetscBool *met)
 {
@@ -1271,19 +1381,25 @@ static PetscErrorCode Conclude(Search *s, HycoROM *model, HycoSamples *grown, Hy
 {
   HycoReducer t = s->t;
   HycoSamples former;
+  HycoTraining best;
   PetscBool met = PETSC_FALSE;
   PetscInt n;
 
   PetscFunctionBegin;
   *again = PETSC_FALSE;
   PetscCall(BuildBest(s, model, report));
+  if (!s->near) PetscCall(TakeBetter(s, model, report));
   if (!s->near) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(JudgeFresh(s, *model, &former, report, &met));
+  if (met) PetscCall(SetFormer(s, NULL, NULL));
   if (!met) {
     *again = PETSC_TRUE;
+    best = *report;
+    PetscCall(TakeBetter(s, model, &best));
+    PetscCall(SetFormer(s, *model, &best));
+    *model = NULL;
     /* Estimates must not be fitted to points that become training points. */
     PetscCall(PetscFree(t->judged_held));
-    PetscCall(HycoROMDestroy(model));
     PetscCall(HycoSamplesGet(former, &n, NULL, NULL));
     report->n_added += n;
     report->n_former += n;
@@ -1295,6 +1411,14 @@ static PetscErrorCode Conclude(Search *s, HycoROM *model, HycoSamples *grown, Hy
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode Round(Search *s, HycoROM *model, HycoSamples *grown, HycoTraining *report, PetscBool *again)
+{
+  PetscFunctionBegin;
+  PetscCall(Rounds(s, grown, report));
+  PetscCall(Conclude(s, model, grown, report, again));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Rounds() tries settings and adds solutions until the targets are met; Conclude() builds the best and judges it at
    fresh points. */
 static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoTraining *report)
@@ -1302,6 +1426,8 @@ static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoT
   HycoReducer t = s->t;
   PetscReal edge = 0;
   PetscBool again = PETSC_TRUE;
+  PetscErrorCode ierr;
+  char message[HYCO_LINE] = "";
 
   PetscFunctionBegin;
   /* Before any attempt changes them. */
@@ -1314,8 +1440,11 @@ static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoT
   PetscCall(HycoReducerGetTargets(t, s->target, s->limit));
   PetscCall(HycoSamplesGet(t->samples, &s->first, NULL, NULL));
   while (again) {
-    PetscCall(Rounds(s, grown, report));
-    PetscCall(Conclude(s, model, grown, report, &again));
+    HycoCatch(Round(s, model, grown, report, &again), ierr, message);
+    PetscCall(Survive(s, ierr, message, (PetscBool)(s->former != NULL)));
+    if (!ierr) continue;
+    PetscCall(TakeBetter(s, model, report));
+    again = PETSC_FALSE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -1347,6 +1476,7 @@ PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *mod
   Forget(s);
   /* After an error a model of an earlier attempt may be left. */
   (void)!HycoROMDestroy(&s->kept);
+  (void)!SetFormer(s, NULL, NULL);
   PetscCall(PetscFree(s));
   t->ridge = -1;
   PetscCall(ierr);

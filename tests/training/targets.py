@@ -2,9 +2,15 @@
 import csv
 import os
 import random
+import sys
 import unittest
 
-from common import PELLET, ROPE, Case
+import h5py
+
+from common import PELLET, ROPE, SOURCE, Case
+
+sys.path.insert(0, os.path.join(SOURCE, 'tests', 'models'))
+from bodies import FOOT  # noqa: E402
 
 RADII = '4.02,4.03,4.04,4.05,4.055,4.07,4.08,4.09,4.10'
 STEPS = ','.join('%.6f' % (k / 12) for k in range(1, 13))
@@ -79,6 +85,21 @@ class Targets(Case):
         self.assertLessEqual(points[-1], 49)
         c = self.hyco('compare', '-scene', ROPE, '-model', 'a.h5', '-grid', '12,12')
         self.assertLess(c['error_u']['mean'], 0.004)
+
+    def test_lost(self):
+        """A solution that is added for a target fails, since the load lifts the body off there: the model that the search had is written with its errors."""
+        args = ('-grid', '3,3', '-hyco_model_type', 'hybrid', '-hyco_pod_tol', '1e-6', '-hyco_hybrid', 'contact', '-target_u', '1e-7', '-target_max_added',
+                '4', '-hyco_validation', '8')
+        scene = FOOT[0].replace('[height, lean, load]', '[height, load]').replace(' lean: {range: [0, 2]},', '').replace(' + lean*y/16', '')
+        self.drawn('foot', 2, FOOT[1], scene)
+        self.hyco('train', '-scene', 'foot', *args, '-model', 'all.h5', status=3)
+        with h5py.File(self.path('all.h5')) as f:
+            height, load = f['training/points'][9]
+        self.changed('foot/scene.yaml', scene, [('*x/10)"', f'*x/10) + 1000*exp(-((height - {height!r})/0.02)^2 - ((load - {load!r})/0.5)^2)"')])
+        t = self.hyco('train', '-scene', 'foot', *args, '-model', 'lost.h5', '-hyco_snapshots', 'lost', status=3)
+        self.assertEqual((t['n_samples'], len(t['missed'])), (9, 1))
+        c = self.hyco('compare', '-scene', 'foot', '-model', 'lost.h5', '-grid', '3,3', '-grid_type', 'centred')
+        self.assertLess(c['error_u']['max'], 3*t['held_out']['u']['largest'])
 
     def scattered(self, name, n):
         """A file of n points of the rope's ranges, none of which training knows."""
