@@ -15,6 +15,8 @@ enum {
   HYCO_ENTERS_SHAPE = 16  /* anything else that changes the stiffness */
 };
 
+#define HYCO_BODIES_SAMPLES 60 /* of bodies that change, without an option */
+
 /* The bodies of a mesh, and how each parameter enters each; on every rank. */
 typedef struct {
   PetscInt n, n_parameters;
@@ -55,9 +57,12 @@ typedef struct {
   HycoBasis strains;                           /* modes of the inelastic forces; V is NULL without a history */
   PetscInt n_laws; /* points of the last model at which the laws are evaluated; 0: none yet */
   HycoBodyParts parts;
-  HycoSubstructures bodies; /* complete on rank 0 */
-  PetscInt n_factors;       /* of single bodies */
-  PetscBool filled;         /* modes are still many for the largest number of samples */
+  HycoSubstructures bodies;  /* complete on rank 0 */
+  PetscInt n_factors;        /* of single bodies */
+  PetscBool filled;          /* modes are still many for the largest number of samples */
+  PetscBool limited;         /* most_samples is the user's */
+  PetscReal room;            /* samples that a finer grid may have */
+  char ended[HYCO_LINE / 4]; /* what ended the sampling above the tolerance; "": nothing */
 } * HycoBodiesTraining;
 
 static inline HycoBodiesTraining HycoTrainingOfBodies(HycoReducer t)

@@ -64,11 +64,12 @@ struct _p_HycoReducer {
                        chosen */
   PetscBool trying; /* an attempt of the search: a model that is not reported */
   PetscBool exhaustive;
-  PetscReal search_budget;  /* operations of a search as a multiple of those of the solutions */
-  PetscInt n_judged;        /* of an attempt, on rank 0: number of predictions at training points (with no solution
+  PetscReal search_budget; /* operations of a search as a multiple of those of the solutions */
+  PetscInt n_judged;       /* of an attempt, on rank 0: number of predictions at training points (with no solution
                               HYCO_UNSOLVED_WORK each), */
-  PetscInt n_unknowns;      /* and of displacements in A that are not fixed */
-  char remedy[HYCO_LINE];   /* of an attempt that gave no model: what else the user may do, of the type; "": nothing */
+  PetscInt n_unknowns;     /* and of displacements in A that are not fixed */
+  char remedy
+      [HYCO_LINE]; /* of an attempt without an accurate model: what else the user may do, of the type; "": nothing */
   char doing[HYCO_LINE];    /* of the search, for the monitor of phases: the settings of the attempt */
   PetscInt most_full_order; /* hybrid all: largest number of full-order displacements; 0: no limit */
   PetscInt scan;            /* points per parameter; 0: chosen by the library */
@@ -319,6 +320,8 @@ PetscErrorCode HycoReducerUnitRows(HycoReducer t, Mat X, Mat *scaled);
 /* Judges the model by the held-out solutions, calibrates its error estimates on them and stores both in it (rank 0):
    report->held_out, and n_held, the number of predictions behind the estimates (0: none, or too few). Collective. */
 PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM model, HycoTraining *report);
+/* The training points at corners of the ranges, at most `most`. The caller owns them. */
+PetscErrorCode HycoReducerCorners(HycoReducer reducer, PetscInt most, HycoSamples *corners);
 
 /* Result of a model at one held-out point, all PetscReal: errors (those of forces before division), for a path at
    its worst time, and at its end; the norms of forces and stress, whether it converged, the number of its group
@@ -359,6 +362,9 @@ typedef struct {
    Collective. */
 PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoSamples points, HycoROM model, HycoSnapshots store,
                                          HycoHeldOutRace *race, HycoHeldOut rows[]);
+/* Judges the model at these corners too, whose rows follow the n held-out ones, and raises the largest errors. Collective. */
+PetscErrorCode HycoReducerJudgeCorners(HycoReducer reducer, HycoSamples corners, PetscInt n, HycoROM model,
+                                       HycoSnapshots store, HycoHeldOut rows[], HycoValidation *held_out);
 /* Predicts at a held-out point of the store, a path in the steps of full order. */
 PetscErrorCode HycoHeldOutPredict(HycoROM model, HycoSnapshots store, const PetscReal mu[]);
 /* At one held-out point by output of the scene: the absolute error, and the largest absolute value at full order; for a

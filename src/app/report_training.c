@@ -277,10 +277,12 @@ static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
                                     : HycoErrorKinds[j],
         t->held_out.largest[j] > PETSC_MAX_REAL / 8 ? "infinite" : reached, (int)t->held_out.n,
         s->on ? "the target is" : "without a target it should stay below", asked, t->next, t->next[0] ? "; or " : "",
-        s->on ? "give more training points, a larger -target_max_added, or a looser target"
-              : "give more training points, with the ends of the ranges among them, let training add them (-target_u "
-                "5e-3 "
-                "-target_lambda 3e-2), or set looser targets"));
+        !t->chosen.settings.pod ? "try another type (-hyco_model_type; more training points change nothing in this "
+                                  "one), or set looser targets"
+        : s->on                 ? "give more training points, a larger -target_max_added, or a looser target"
+                : "give more training points, with the ends of the ranges among them, let training add them (-target_u "
+                  "5e-3 "
+                  "-target_lambda 3e-2), or set looser targets"));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -781,6 +781,118 @@ static PetscErrorCode DrawHeld(HycoReducer t, PetscInt count, PetscInt together,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+#define CLOSE   2  /* held-out points at which each contact shall have a force, or a ninth of them if more; */
+#define FURTHER 12 /* at most so many more are drawn for that, */
+#define AMONG   64 /* those with the smallest gaps among so many */
+
+/* The scene's contact that has a force at the fewest of the held-out points, and at how many. Rank 0. */
+static PetscErrorCode CountClosed(HycoReducer t, HycoSnapshots store, PetscInt *which, PetscInt *least)
+{
+  const HycoPairs *pairs = &t->fom->pairs;
+  const PetscInt n_contacts = t->scene->n_contacts;
+  PetscInt n, n_par, *closed;
+  PetscBool *presses;
+  PetscReal *force;
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->held, &n, &n_par, &mu));
+  PetscCall(PetscMalloc3(pairs->n + 1, &force, n_contacts, &presses, n_contacts, &closed));
+  PetscCall(PetscArrayzero(closed, n_contacts));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscCall(PetscArrayzero(presses, n_contacts));
+    for (PetscInt step = 0; step < HycoSnapshotsSteps(t->scene); step++) {
+      PetscCall(HycoSnapshotsReadRows(store, mu + k * n_par, step, HycoSeedFields[HYCO_SEED_DUAL], 0, pairs->n, force));
+      for (PetscInt i = 0; i < pairs->n; i++)
+        presses[pairs->contact[i]] = (PetscBool)(presses[pairs->contact[i]] || force[i] > 0);
+    }
+    for (PetscInt c = 0; c < n_contacts; c++) closed[c] += presses[c];
+  }
+  *least = n;
+  *which = 0;
+  for (PetscInt c = 0; c < n_contacts; c++) {
+    if (closed[c] >= *least) continue;
+    *least = closed[c];
+    *which = c;
+  }
+  PetscCall(PetscFree3(force, presses, closed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The smallest gap of a contact before any load at each of n points; a point that fails, where surfaces overlap, is the
+   last one. Rank 0. */
+static PetscErrorCode FindGaps(HycoReducer t, PetscInt which, PetscInt n, const PetscReal mu[], PetscReal gap[])
+{
+  HycoFOM f = t->fom;
+  HycoRows rows = {0};
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++) {
+    PetscReal all[HYCO_MAX_PARAMETERS];
+    char message[HYCO_LINE];
+    PetscErrorCode ierr;
+
+    gap[k] = PETSC_MAX_REAL;
+    HycoSceneSetTime(t->scene, mu + k * t->scene->n_parameters, t->scene->n_times ? t->scene->times[0] : 0, all);
+    PetscCall(HycoCatchBegin());
+    ierr = HycoFESetParameters(f->fe_surface, all);
+    if (!ierr) ierr = HycoContactRows(f->fe_surface, &f->pairs, &rows);
+    PetscCall(HycoCatchEnd(ierr, message));
+    for (PetscInt i = 0; i < f->pairs.n && !ierr; i++) {
+      if (f->pairs.contact[i] == which) gap[k] = PetscMin(gap[k], rows.gap[i]);
+    }
+  }
+  /* It is at the last point's parameters. */
+  f->fe_surface->ready = PETSC_FALSE;
+  PetscCall(HycoRowsDestroy(&rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds held-out points at which a contact is likely to have a force. Collective. */
+static PetscErrorCode DrawClosed(HycoReducer t, PetscInt which)
+{
+  HycoSamples drawn;
+  PetscInt n, n_par, order[AMONG];
+  PetscReal gap[AMONG];
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  PetscCall(DrawHeld(t, AMONG, 1, &drawn));
+  PetscCall(HycoSamplesGet(drawn, &n, &n_par, &mu));
+  HycoOnRoot(HycoComm(t), FindGaps(t, which, n, mu, gap));
+  HycoBcast(gap, n, MPIU_REAL, HycoComm(t));
+  for (PetscInt k = 0; k < n; k++) order[k] = k;
+  PetscCall(PetscSortRealWithArrayInt(n, gap, order));
+  for (PetscInt k = 0; k < PetscMin(n, FEW_HELD); k++) PetscCall(HycoSamplesAddPoint(t->held, mu + order[k] * n_par));
+  PetscCall(HycoSamplesDropTwins(t->held, NULL));
+  PetscCall(HycoSamplesDestroy(&drawn));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Solves the held-out points. Where contacts are open at nearly all of them, nothing would judge what a model does with
+   contact: further points are drawn. */
+static PetscErrorCode SolveHeld(HycoReducer t, HycoSnapshots store)
+{
+  PetscInt n, first;
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducerSolve(t, store, t->held));
+  PetscCall(HycoSamplesGet(t->held, &first, NULL, NULL));
+  n = first;
+  while (t->sizes[2] && !t->validation && t->n_validation < 0 && n < first + FURTHER) {
+    PetscInt closed[2] = {0, 0}, before = n;
+
+    HycoOnRoot(HycoComm(t), CountClosed(t, store, &closed[0], &closed[1]));
+    HycoBcast(closed, 2, MPIU_INT, HycoComm(t));
+    if (closed[1] >= PetscMax(CLOSE, first / 9)) break;
+    PetscCall(DrawClosed(t, closed[0]));
+    PetscCall(HycoReducerSolve(t, store, t->held));
+    PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
+    if (n == before) break; /* parameters without ranges have one point */
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* FEW_HELD where types with modes of their own are tried first (t->few): the others come by
    HycoReducerHoldOutMore() if those do not suffice. */
 PetscErrorCode HycoReducerHoldOut(HycoReducer t, HycoSnapshots store)
@@ -802,7 +914,7 @@ PetscErrorCode HycoReducerHoldOut(HycoReducer t, HycoSnapshots store)
     PetscCall(DrawHeld(t, t->few ? FEW_HELD : t->n_validation, t->few ? 1 : TOGETHER, &t->held));
   else
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoReducerSolve(t, store, t->held));
+  PetscCall(SolveHeld(t, store));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -810,18 +922,19 @@ PetscErrorCode HycoReducerHoldOut(HycoReducer t, HycoSnapshots store)
 PetscErrorCode HycoReducerHoldOutMore(HycoReducer t, HycoSnapshots store)
 {
   HycoSamples more;
-  PetscInt n;
+  PetscInt n, n_held;
 
   PetscFunctionBegin;
   if (!t->few) PetscFunctionReturn(PETSC_SUCCESS);
   t->few = PETSC_FALSE;
   PetscCall(HycoSamplesGet(t->samples, &n, NULL, NULL));
-  PetscCall(DrawHeld(t, HeldByDefault(n) - FEW_HELD, TOGETHER, &more));
+  PetscCall(HycoSamplesGet(t->held, &n_held, NULL, NULL));
+  PetscCall(DrawHeld(t, PetscMax(FEW_HELD, HeldByDefault(n) - n_held), TOGETHER, &more));
   PetscCall(HycoSamplesAddSet(t->held, more));
   /* Drawn points may meet earlier ones, for instance corners. */
   PetscCall(HycoSamplesDropTwins(t->held, NULL));
   PetscCall(HycoSamplesDestroy(&more));
-  PetscCall(HycoReducerSolve(t, store, t->held));
+  PetscCall(SolveHeld(t, store));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -312,9 +312,9 @@ static PetscErrorCode Conclude(HycoReducer t, HycoSamples points, PetscInt n, Hy
 
 #define CORNERS 3 /* held-out points for each corner that judges too */
 
-/* The training points at corners of the ranges, at most `most`, spread over them. The held-out points of a training on
-   a closed grid have no corner, where errors may be larger than inside although the corner was trained on. */
-static PetscErrorCode TrainingCorners(HycoReducer t, PetscInt most, HycoSamples *corners)
+/* Spread over them. The held-out points of a training on a closed grid have no corner, where errors may be larger than inside
+   although the corner was trained on. */
+PetscErrorCode HycoReducerCorners(HycoReducer t, PetscInt most, HycoSamples *corners)
 {
   const HycoScene scene = t->scene;
   PetscInt n, n_par, found = 0, *at;
@@ -338,14 +338,15 @@ static PetscErrorCode TrainingCorners(HycoReducer t, PetscInt most, HycoSamples 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Judges at n_corners corners too: their rows follow those of the held-out points. They enter the largest errors,
-   not the medians: the held-out points are distributed like a user's, corners are not. */
-static PetscErrorCode JudgeCorners(HycoReducer t, HycoSamples corners, PetscInt n, PetscInt n_corners, HycoROM model,
-                                   HycoSnapshots store, HycoHeldOut rows[], HycoValidation *held_out)
+/* They enter the largest errors, not the medians: the held-out points are distributed like a user's, corners are not. */
+PetscErrorCode HycoReducerJudgeCorners(HycoReducer t, HycoSamples corners, PetscInt n, HycoROM model,
+                                       HycoSnapshots store, HycoHeldOut rows[], HycoValidation *held_out)
 {
   HycoValidation there = {0};
+  PetscInt n_corners;
 
   PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(corners, &n_corners, NULL, NULL));
   if (!n_corners) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoReducerPredictHeldOut(t, corners, model, store, NULL, rows + n));
   /* The scale of forces is that of all points, so that corners with small forces are judged alike. */
@@ -386,7 +387,7 @@ PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM 
   t->judged_held = NULL;
   if (t->held) PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(TrainingCorners(t, t->validation || n < Least(model) ? 0 : n / CORNERS, &corners));
+  PetscCall(HycoReducerCorners(t, t->validation || n < Least(model) ? 0 : n / CORNERS, &corners));
   PetscCall(HycoSamplesGet(corners, &n_corners, NULL, NULL));
   /* The training points were not solved: their corners are now. */
   if (t->late && n_corners) PetscCall(HycoReducerSolve(t, store, corners));
@@ -397,7 +398,7 @@ PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM 
   }
   PetscCall(PetscRealloc((size_t)(n + n_corners) * sizeof(*rows), &rows));
   PetscCall(HycoHeldOutSummarise(n, rows, HycoHeldOutForce(n, rows), &report->held_out));
-  PetscCall(JudgeCorners(t, corners, n, n_corners, model, store, rows, &report->held_out));
+  PetscCall(HycoReducerJudgeCorners(t, corners, n, model, store, rows, &report->held_out));
   report->n_corners = n_corners;
   PetscCall(HycoSamplesCreate(t->scene, &all));
   PetscCall(HycoSamplesAddSet(all, t->held));

@@ -499,7 +499,7 @@ static PetscErrorCode ProjectBatch(HycoReducer t, PetscInt first, Mat S, void *c
   PetscCall(RemoveLifting(t, X));
   PetscCall(MatGetColumnNorms(X, NORM_2, t->U_norm + first));
   /* All modes of the basis: any truncation takes the first rows of a column. */
-  PetscCall(HycoReducerMultiply(t, basis->V, X, basis->coefficients + (size_t)first * (size_t)basis->l));
+  if (basis->l) PetscCall(HycoReducerMultiply(t, basis->V, X, basis->coefficients + (size_t)first * (size_t)basis->l));
   PetscCall(MatDestroy(&X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -517,7 +517,8 @@ static PetscErrorCode ReduceDisplacements(HycoReducer t, HycoSnapshots store, Pe
   PetscCall(FindBasis(t, store, HYCO_SEED_DISPLACEMENT, all));
   HycoCheckModel(basis->l || !(basis->sigma[0] > 0), "-hyco_pod_tol %g leaves no mode; give a smaller value",
                  (double)t->tol[HYCO_SEED_DISPLACEMENT]);
-  HycoCheckModel(basis->l,
+  /* A type with modes of its own needs none of these. */
+  HycoCheckModel(basis->l || HycoReducerOwnModes(t, t->prototype),
                  "every training solution has zero displacement, so that there are no modes; check the loads");
   PetscCall(PetscMalloc1(t->n_s, &t->U_norm));
   PetscCall(PetscMalloc1((size_t)basis->l * (size_t)t->n_s, &basis->coefficients));
@@ -563,7 +564,8 @@ static PetscErrorCode TakeDisplacements(HycoReducer t)
 
   PetscFunctionBegin;
   PetscCall(CutBasis(t, HYCO_SEED_DISPLACEMENT, &V, &t->l));
-  HycoCheckModel(t->l, "-hyco_pod_tol %g leaves no mode; give a smaller value", (double)t->tol[HYCO_SEED_DISPLACEMENT]);
+  HycoCheckModel(t->l || HycoReducerOwnModes(t, t->prototype), "-hyco_pod_tol %g leaves no mode; give a smaller value",
+                 (double)t->tol[HYCO_SEED_DISPLACEMENT]);
   PetscCall(PetscMalloc1(PetscMax(t->n_s, basis->n_sigma) + 1, &t->sigma));
   PetscCall(PetscArraycpy(t->sigma, basis->sigma, PetscMax(t->n_s, basis->n_sigma) + 1));
   PetscCall(SeedFrom(t, V, t->l, HYCO_SEED_DISPLACEMENT, t->sizes[3], &t->n_seeds_node, &t->seeds_node));

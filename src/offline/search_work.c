@@ -79,7 +79,7 @@ PetscErrorCode HycoReducerSolutionsWork(HycoReducer t, PetscReal *work)
 
   PetscFunctionBegin;
   *work = 0;
-  for (int k = 0; k < 2; k++) {
+  for (int k = 0; k < 2 && sets[k]; k++) { /* there may be no held-out points */
     PetscInt n, factors;
 
     PetscCall(HycoSamplesGet(sets[k], &n, NULL, NULL));

@@ -87,7 +87,7 @@ typedef struct {
   PetscInt former_l;
   HycoLeftOut left_out[HYCO_MAX_LEFT_OUT];
   PetscInt n_left_out;
-  char remedy[HYCO_LINE]; /* of a type that gave no model: HycoReducer's remedy */
+  char remedy[HYCO_LINE]; /* of a type that gave no accurate model: HycoReducer's remedy */
 } Search;
 
 /* Notes what the search does not try; the first reason counts. Void, with PETSc's error codes dropped: notes for
@@ -173,6 +173,41 @@ static PetscReal Quotient(const Search *s, const HycoHeldOut *row)
   return ratio;
 }
 
+/* The largest quotient of the attempt's errors. */
+static void Rate(const Search *s, HycoAttempt *a)
+{
+  a->ratio = 0;
+  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
+    const PetscReal ratio = QuotientOf(s, j, a->held_out.largest[j]);
+
+    if (ratio <= a->ratio) continue;
+    a->ratio = ratio;
+    a->worst = (HycoErrorKind)j;
+  }
+}
+
+/* What seems accurate is also judged at the corners of the training, where errors may be larger than inside: as far as
+   their solutions are there. */
+static PetscErrorCode RateCorners(Search *s, HycoROM model, const HycoHeldOut rows[], HycoAttempt *a)
+{
+  HycoReducer t = s->t;
+  HycoSamples corners;
+  HycoHeldOut *all;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  if (a->ratio > 1 || t->late || t->validation || t->scene->n_times) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoReducerCorners(t, a->n_held, &corners));
+  PetscCall(HycoSamplesGet(corners, &n, NULL, NULL));
+  PetscCall(PetscCalloc1(a->n_held + n, &all));
+  PetscCall(PetscArraycpy(all, rows, a->n_held));
+  HycoFinally(HycoReducerJudgeCorners(t, corners, a->n_held, model, s->store, all, &a->held_out),
+              PetscCall(HycoSamplesDestroy(&corners));
+              PetscCall(PetscFree(all)));
+  Rate(s, a);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The errors at the held-out points that were predicted, and their largest quotient. */
 static PetscErrorCode Summarise(Search *s, const HycoHeldOutRace *race, const HycoHeldOut rows[], HycoAttempt *a)
 {
@@ -188,14 +223,7 @@ static PetscErrorCode Summarise(Search *s, const HycoHeldOutRace *race, const Hy
   PetscCall(PetscFree(some));
   /* The size of forces is the full-order solutions': known once all points were compared. */
   if (race->n == a->n_held && !a->held_out.not_converged) s->force = force;
-  a->ratio = 0;
-  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
-    const PetscReal ratio = QuotientOf(s, j, a->held_out.largest[j]);
-
-    if (ratio <= a->ratio) continue;
-    a->ratio = ratio;
-    a->worst = (HycoErrorKind)j;
-  }
+  Rate(s, a);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -249,6 +277,7 @@ static PetscErrorCode Judge(Search *s, HycoROM model, PetscBool all, HycoAttempt
   PetscCall(HycoReducerPredictHeldOut(t, t->held, model, s->store, t->scene->n_times ? &race : NULL, rows));
   if (!t->scene->n_times) race.n = n;
   PetscCall(Summarise(s, &race, rows, a));
+  PetscCall(RateCorners(s, model, rows, a));
   if (race.lost) {
     a->dropped_at = s->order[race.n - 1];
     a->beaten_by = a->held_out.not_converged ? 0 : beaten;
@@ -454,7 +483,7 @@ static PetscErrorCode Make(Search *s, const HycoReducerSettings *settings, Petsc
   /* An error of another kind (memory, a damaged file) is not a property of the settings. */
   PetscCall(HycoCatchNoModel(ierr, message));
   if (message[0]) a->ratio = PETSC_INFINITY;
-  if (message[0] && t->remedy[0]) PetscCall(PetscStrncpy(s->remedy, t->remedy, sizeof(s->remedy)));
+  if (!(a->ratio <= 1) && t->remedy[0]) PetscCall(PetscStrncpy(s->remedy, t->remedy, sizeof(s->remedy)));
   PetscCall(PetscStrncpy(a->failure, message, sizeof(a->failure)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -1115,8 +1144,8 @@ static PetscErrorCode Advise(Search *s, HycoTraining *report)
 
   PetscFunctionBegin;
   PetscCall(FindTelling(s, t->samples, &by));
-  /* More values of one parameter cost fewer solutions than more of all. */
-  if (by >= 0)
+  /* More values of one parameter cost fewer solutions than more of all. Modes of a type's own do not follow them. */
+  if (by >= 0 && report->chosen.settings.pod)
     snprintf(values, sizeof(values), "give more values of %s, whose training values are too far apart",
              t->scene->parameter[by]);
   next[0] = '\0';

@@ -56,7 +56,9 @@ const char *const HycoFeatureNames[] = {"misfit of the full-order displacements"
 
 /* Values of the features up to which no regime is new; 0: not used for this purpose. */
 static const PetscReal slight[HYCO_FEATURES] = {1e-6, 1e-6, 1e-3, 0, 0, 1e-7, 0.02, 0.02, 0.02};
-#define MOST_FACTOR  100  /* of the estimates in a new regime */
+#define MOST_FACTOR 100 /* of the estimates in a new regime */
+#define FRESH                                                                                                          \
+  (0.5 / HYCO_UNSEEN)     /* half of the force at new contacts is a new regime, also if held-out points had it */
 #define INCONSISTENT 1e-3 /* smaller differences are none in practice; */
 #define UNJUDGED     1e-2 /* likewise in a model without held-out points */
 #define UNBALANCED   1e-8 /* forces that balance to it are those that balance but for round-off */
@@ -276,7 +278,7 @@ static PetscReal Unseen(HycoROM m, const PetscReal feature[], PetscInt *which)
 
   *which = -1;
   for (PetscInt j = 0; j < HYCO_FEATURES; j++) {
-    const PetscReal reached = m->model->estimates.reached[j];
+    const PetscReal met = m->model->estimates.reached[j], reached = j == NEW_CONTACTS ? PetscMin(met, FRESH) : met;
 
     /* slight: changes below it are round-off of the feature, whatever the held-out values were. A negative `reached` is
        a feature that no held-out point had. */
@@ -376,7 +378,9 @@ static PetscErrorCode EvaluateFeatures(HycoROM m, const PetscReal nearest[], Hyc
     /* Beyond the training the estimates grow with the square of the distance in units of a usual distance between points. */
     outside = 1 + (p->beyond > 0 ? HycoEstimatesDistance(m->model->scene, m->fe->mu, nearest) / t->floor[DISTANCE] : 0);
     outside = p->beyond > 0 ? PetscMax(outside * outside, m->stretch) : 1;
-    EvaluateFormulas(m, feature, outside * factor, p);
+    /* Beside contacts that no solution closed no error was ever measured. */
+    if (p->unseen_feature != NEW_CONTACTS || p->unseen <= HYCO_UNSEEN)
+      EvaluateFormulas(m, feature, outside * factor, p);
     for (PetscInt q = 0; torn && q < t->n_outputs; q++) {
       if (HycoQuantityOfStress(&m->model->scene->quantity[q])) p->estimated_error_quantity[q] = -1;
     }

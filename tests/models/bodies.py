@@ -14,7 +14,7 @@ import numpy as np
 
 import rigid_motions
 import rigid
-from common import HYCO, PATIENCE, SANITIZED, SOURCE, Case
+from common import HYCO, PATIENCE, SANITIZED, SOURCE, Case, square
 
 MESH = os.path.join(SOURCE, 'examples', '{0}', '{0}.msh')
 TYPE = ('-hyco_model_type', 'bodies')
@@ -571,6 +571,60 @@ class Bodies(Case):
         self.refused(ROLLER, 'GB to be made (the factor', '-hyco_memory', options=('-hyco_memory', '0.001', '-hyco_linear', 'direct'))
         alone = re.sub(r'contact: .*', '', TURNED)
         self.refused(self.write('alone.yaml', alone), 'the scene has no contact')
+
+
+class Regimes(Case):
+    """Trainings as a user's: held-out points, search."""
+    newcomer = True
+    LID = """
+scene: {mesh: mesh.msh, parameters: [p, q]}
+parameter: {p: {range: [0, 1]}, q: {range: [0, 1]}}
+body: {block: {young: 1000, poisson: 0.3}}
+fixed: {low: {x: 0, y: 0}}
+pressure: {left: "%s"}
+contact: {lid: {type: obstacle, group: high, normal: {y: 1}, gap: "abs(p-0.45)+abs(q-0.55)-0.2"}}
+"""
+
+    def test_rare_contact(self):
+        """Contact at a twelfth of the ranges: bodies need no held-out point with contact, and are exact there; without points of the user's some are drawn."""
+        scene = self.written(self.LID % '0', square(2))
+        with open(self.path('none.csv'), 'w', encoding='ascii') as f:
+            f.write('p,q\n0.02,0.1\n0.98,0.9\n0.1,0.9\n0.9,0.1\n0.03,0.52\n0.97,0.57\n')
+        full = self.hyco('solve', '-scene', scene, '-mu', '0.45,0.56')
+        for words in ((*TYPE, '-validation_points', self.path('none.csv')), ()):
+            r = self.hyco('train', '-scene', scene, '-grid', '5,5', '-model', 'rare.h5', *words)
+            self.assertEqual(r['model_type'], 'bodies')
+            self.assertEqual(r['held_out']['lambda']['largest'] > 0, not words)  # round-off, where there are forces
+            p = self.hyco('predict', '-model', 'rare.h5', '-mu', '0.45,0.56')
+            self.near(p['total_contact_force'], full['total_contact_force'], 1e-10)
+
+    def test_new_contacts(self):
+        """A hybrid model whose training has no contact: where a prediction has, it is an unseen regime, without estimates."""
+        scene = self.written(self.LID % '1 + p', square(2))
+        self.hyco('train', '-scene', scene, '-grid', '2,2', '-hyco_model_type', 'hybrid', '-model', 'new.h5')
+        p = self.hyco('predict', '-model', 'new.h5', '-mu', '0.45,0.56')
+        self.assertGreater(p['unseen'], 3)
+        self.assertIn('no training solution closes', p['unseen_feature'])
+        self.assertEqual((p['estimated_error_u'], p['estimated_error_sigma'], p['estimated_error_lambda']), (None, None, None))
+        self.assertIsNotNone(self.hyco('predict', '-model', 'new.h5', '-mu', '0.02,0.1')['estimated_error_u'])
+
+    def test_samples_go_on(self):
+        """Samples of a shape are added beyond 60 while they are cheap, until the bound is small, and corners have the forces of full order; what a
+        limit of the user's leaves is said with the option."""
+        scene = self.written("""
+scene: {mesh: mesh.msh, parameters: [a, b]}
+parameter: {a: {range: [0.3, 1.5]}, b: {range: [-0.4, 0.4]}}
+body: {block: {young: 1000, poisson: 0.3, map: {x: "x*(1 + b*y)", y: "a*y*(1 + b*x)"}}}
+fixed: {low: {x: 0, y: 0}}
+contact: {lid: {type: obstacle, group: high, normal: {y: 1}, gap: "-0.02"}}
+""", square(3))
+        r = self.hyco('train', '-scene', scene, '-scatter', '5', *TYPE, '-model', 'on.h5')
+        self.assertGreater(r['n_body_samples'], 60)
+        for mu in ('0.3,-0.4', '1.5,0.4', '0.3,0.4'):
+            p, full = self.hyco('predict', '-model', 'on.h5', '-mu', mu), self.hyco('solve', '-scene', scene, '-mu', mu)
+            self.near(p['total_contact_force'], full['total_contact_force'], 1e-3)
+        run = self.run_raw('train', '-scene', scene, '-scatter', '5', *TYPE, '-model', 'off.h5', '-hyco_bodies_max_samples', '20')
+        self.assertIn('-hyco_bodies_max_samples', run.stdout)
 
 
 if __name__ == '__main__':

@@ -25,7 +25,7 @@ static PetscErrorCode SetFromOptions(HycoReducer t)
   s->cells = 2;
   s->cubature_tol = 1e-4;
   s->tol = 1e-5;
-  s->most_samples = 60;
+  s->most_samples = HYCO_BODIES_SAMPLES;
   PetscObjectOptionsBegin((PetscObject)t);
   PetscCall(HycoOptionsFor("bodies"));
   PetscCall(HycoOptionsReal("-hyco_bodies_pod_tol", "bodies: energy left out of the displacement modes of each body", 0,
@@ -39,8 +39,10 @@ static PetscErrorCode SetFromOptions(HycoReducer t)
                             "bodies: samples of bodies whose shape or ratio of moduli changes are added until the "
                             "relative error of their flexibility at held-out samples is no larger",
                             0, 1, &s->tol, NULL));
-  PetscCall(HycoOptionsInt("-hyco_bodies_max_samples", "bodies: largest number of these samples", 1, 100000,
-                           &s->most_samples, NULL));
+  PetscCall(HycoOptionsInt("-hyco_bodies_max_samples",
+                           "bodies: largest number of these samples; if it is not given, more of them while they take "
+                           "no more operations than a search may",
+                           1, 100000, &s->most_samples, &s->limited));
   PetscCall(HycoOptionsFor("bodies, of a history"));
   PetscCall(HycoOptionsReal("-hyco_bodies_inelastic_tol",
                             "bodies, with a history: energy left out of the modes of the inelastic strain", 0, 1,
@@ -221,7 +223,8 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   HycoSubstructures b = (HycoSubstructures)m->model->data;
   const char *filled = "; displacements still need more modes than half of the samples, so that those away from the "
                        "contact are less accurate (-hyco_bodies_samples)";
-  char bound[HYCO_LINE / 4];
+  const HycoBodiesTraining s = HycoTrainingOfBodies(t);
+  char bound[HYCO_LINE];
 
   PetscFunctionBegin;
   if (t->scene->n_times) {
@@ -236,8 +239,8 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   if (b->n_theta)
     snprintf(bound, sizeof(bound),
              "%d samples of their shapes and stiffnesses, contact forces within %.2g %% (bound at "
-             "held-out samples)",
-             (int)HycoBodiesGrid(b, 0, NULL), 100 * (double)b->forces);
+             "held-out samples)%s%s",
+             (int)HycoBodiesGrid(b, 0, NULL), 100 * (double)b->forces, s->ended[0] ? "; for less " : "", s->ended);
   else
     snprintf(bound, sizeof(bound), "nothing is interpolated, contact forces are exact");
   HycoFormat(r->summary,
@@ -245,7 +248,7 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
              "load%s, %d "
              "displacement modes%s\n",
              (int)b->n, b->n == 1 ? "y" : "ies", (int)b->ns, (int)b->ni, bound, (int)b->r, b->r == 1 ? "" : "s",
-             (int)r->n_modes, HycoTrainingOfBodies(t)->filled ? filled : "");
+             (int)r->n_modes, s->filled ? filled : "");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -78,7 +78,8 @@ static PetscErrorCode MarkInner(HycoReducer t, HycoBodiesFactor *factor, const P
   HycoAllreduce(n, b->n, MPIU_REAL, MPI_SUM, HycoComm(t));
   for (PetscInt k = 0; k < b->n; k++) {
     rows += n[k];
-    numbers += n[k] * b->body[k].n * b->body[k].n_samples;
+    /* As many cells as with the usual samples: more of them shall not cost stresses. */
+    numbers += n[k] * b->body[k].n * PetscMin(b->body[k].n_samples, HYCO_BODIES_SAMPLES);
   }
   *fits = (PetscBool)(rows <= MOST_INNER && numbers <= MOST_NUMBERS);
   PetscCall(PetscFree(n));

@@ -11,7 +11,11 @@
 #define MOST_VALUES 17
 #define HOPELESS    0.3 /* e above which the model is refused */
 #define ITERATIONS  30  /* of the power method */
-#define SHORTENED   0.1 /* share of the tolerance that left out terms and single precision may add to e */
+/* More samples than HYCO_BODIES_SAMPLES make predictions slower. They are added while e is above ENOUGH: */
+#define ENOUGH       1e-4
+#define MOST_CHEAP   500 /* at most so many, */
+#define MOST_NUMBERS 2e7 /* and of so many numbers of their flexibilities */
+#define SHORTENED    0.1 /* share of the tolerance that left out terms and single precision may add to e */
 
 /* Node k of n along parameter p, in its own variable. Chebyshev points of the second kind (extrema), nested when their
    number n goes to 2 n - 1: former samples stay. Ends exactly, without round-off. */
@@ -318,19 +322,51 @@ static PetscErrorCode CondenseGrid(HycoReducer t, HycoBodiesFactor *factor)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The axis with the largest e that a finer grid may reduce, -1: none. */
+/* How many samples there may be: without a limit of the user's more than most_samples where they are cheap. Collective. */
+static PetscErrorCode FindRoom(HycoReducer t)
+{
+  const HycoBodiesTraining s = HycoTrainingOfBodies(t);
+  const HycoSubstructures b = s->bodies;
+  PetscReal numbers = 0, work = HycoReducerFactorWork(t), budget;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < b->n; k++) {
+    const PetscReal n = (PetscReal)b->body[k].n;
+
+    numbers += n * n;
+    work += n * HycoReducerSolveWork(t) + n * n * n / 3;
+  }
+  PetscCall(HycoReducerSearchBudget(t, &budget));
+  s->room = s->most_samples;
+  if (!s->limited)
+    s->room = PetscMax(s->room, PetscMin(PetscMin(budget / work, MOST_CHEAP), MOST_NUMBERS / PetscMax(numbers, 1)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The axis with the largest e that a finer grid may reduce, -1: none; then s->ended says what does not let it. */
 static PetscInt Worst(HycoReducer t, HycoSubstructures b, const PetscReal e[])
 {
   const HycoBodiesTraining s = HycoTrainingOfBodies(t);
+  PetscReal most = 0;
   PetscInt worst = -1;
 
   for (PetscInt p = 0; p < b->n_theta; p++) {
-    const PetscInt finer = 2 * b->n_nodes[p] - 1;
-    const PetscInt n = HycoBodiesGrid(b, 0, NULL) / b->n_nodes[p] * finer;
+    const PetscInt finer = 2 * b->n_nodes[p] - 1, n = HycoBodiesGrid(b, 0, NULL) / b->n_nodes[p] * finer;
+    const char *name = t->scene->parameter[b->theta[p]];
+    const PetscReal room = e[p] > ENOUGH / b->n_theta ? s->room : (PetscReal)s->most_samples;
+    const PetscBool ends = (PetscBool)(finer > MOST_VALUES || n > room);
 
     /* The axes' errors add up: each may use its share of the tolerance. */
-    if (e[p] <= s->tol / b->n_theta || finer > MOST_VALUES || n > s->most_samples) continue;
-    if (worst < 0 || e[p] > e[worst]) worst = p;
+    if (e[p] <= s->tol / b->n_theta) continue;
+    if (!ends && (worst < 0 || e[p] > e[worst])) worst = p;
+    if (!ends || e[p] <= most || (!s->limited && e[p] <= ENOUGH / b->n_theta)) continue;
+    most = e[p];
+    if (finer > MOST_VALUES)
+      snprintf(s->ended, sizeof(s->ended), "narrow the range of %s, of which %d values are not enough", name,
+               (int)b->n_nodes[p]);
+    else
+      snprintf(s->ended, sizeof(s->ended), "give -hyco_bodies_max_samples %d or more, for more values of %s", (int)n,
+               name);
   }
   return worst;
 }
@@ -378,7 +414,9 @@ static PetscErrorCode Refine(HycoReducer t, HycoBodiesFactor *factor, Held held[
   PetscInt worst;
 
   PetscFunctionBegin;
+  PetscCall(FindRoom(t));
   do {
+    HycoTrainingOfBodies(t)->ended[0] = '\0';
     PetscCall(CondenseGrid(t, factor));
     for (PetscInt p = 0; p < b->n_theta; p++) PetscCall(BoundAlong(t, factor, p, held + 2 * p, &e[p]));
     worst = Worst(t, b, e);
@@ -392,9 +430,11 @@ static PetscErrorCode Refine(HycoReducer t, HycoBodiesFactor *factor, Held held[
     b->bound += e[p];
     HycoCheckModel(e[p] <= HOPELESS,
                    "the flexibility of a body cannot be interpolated over %s: with %d values its relative error is "
-                   "%.2g; train a hybrid model",
-                   t->scene->parameter[b->theta[p]], (int)b->n_nodes[p], (double)e[p]);
+                   "%.2g; %s, or train a hybrid model",
+                   t->scene->parameter[b->theta[p]], (int)b->n_nodes[p], (double)e[p], HycoTrainingOfBodies(t)->ended);
   }
+  /* What helps if the model misses: nothing else lowers its errors. */
+  PetscCall(PetscStrncpy(t->remedy, HycoTrainingOfBodies(t)->ended, sizeof(t->remedy)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
