@@ -6,6 +6,9 @@
 #include <hycoreducerimpl.h>
 #include <hycosnapshotsimpl.h>
 
+/* Parameters that change the shape of bodies, at most. */
+#define HYCO_MOST_THETA 3
+
 /* How a parameter enters a body: the sum of these. */
 enum {
   HYCO_ENTERS_LOADS = 1,  /* loads, prescribed displacements */

@@ -134,7 +134,7 @@ PetscErrorCode CheckReportMotions(Check *check)
     CheckReportWarning(
         check,
         "%d rigid motion%s prevented only by contact: full order can solve this if the loads press the bodies "
-        "together, and so can models of bodies, hybrid and projection-based ones",
+        "together, and so can reduced models",
         (int)in->loose, in->loose > 1 ? "s are" : " is");
   cJSON_AddNumberToObject(check->json, "n_lifted", in->n_lifted);
   if (in->n_lifted)

@@ -180,7 +180,7 @@ class Check(Case):
         self.assertIn('upper', found['free_motions'][0])
         self.assertIn('(0, 1, 0)', found['free_motions'][0])
         self.warned(found, 'only by contact')
-        self.warned(found, 'so can models of bodies')
+        self.warned(found, 'so can reduced models')
         with open(free, 'w', encoding='utf-8') as f:
             f.write(text.replace('  upper_sym: {x: 0}', '#'))
         for ranks in (0, 2):

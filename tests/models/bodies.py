@@ -568,6 +568,7 @@ class Bodies(Case):
         little memory."""
         four = TURNED.replace('size*(x*cos(', 'size*(1 + place*y/99 + press*y/99 + modulus*y^2/999)*(x*cos(')
         self.refused(self.write('four.yaml', four), 'and a model of bodies samples at most 3')
+        self.assertIn('at most 3', self.hyco('check', '-scene', self.path('four.yaml'))['bodies_by_parameter'])
         self.refused(ROLLER, 'GB to be made (the factor', '-hyco_memory', options=('-hyco_memory', '0.001', '-hyco_linear', 'direct'))
         alone = re.sub(r'contact: .*', '', TURNED)
         self.refused(self.write('alone.yaml', alone), 'the scene has no contact')

@@ -7,7 +7,6 @@
 #define RINGS         2    /* of facets around those that slaves met at some points of the ranges */
 #define SEARCHED      200  /* such points */
 #define LEAST         3    /* values of each of the parameters theta */
-#define MOST_THETA    3    /* parameters that change the shape of bodies */
 #define BENDS         4    /* parts of a parameter's range over which nodes move along lines or not */
 #define STRAIGHTER    0.1  /* share of the squared distance from a line from which another variable is better */
 
@@ -36,10 +35,10 @@ static PetscErrorCode CheckParts(HycoReducer t)
     /* The message names bodies and parameters: either may be changed. */
     if (HycoBodyPartsShapes(parts, k, own)) PetscCall(HycoListAdd(bodies, ", ", parts->name[k]));
   }
-  HycoCheckModel(n <= MOST_THETA,
+  HycoCheckModel(n <= HYCO_MOST_THETA,
                  "body %s: %d parameters change shapes or ratios of moduli (%s), and a model of bodies samples at most "
                  "%d; train a hybrid model",
-                 bodies, (int)n, list, MOST_THETA);
+                 bodies, (int)n, list, HYCO_MOST_THETA);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

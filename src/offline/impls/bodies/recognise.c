@@ -550,5 +550,9 @@ PetscErrorCode HycoBodyPartsDescribe(HycoScene s, const HycoBodyParts *parts, ch
     PetscCall(HycoListAdd(text, "; ", line));
   } else if (!HycoBodyPartsShapes(parts, -1, shape))
     PetscCall(HycoListAdd(text, "; ", "nothing needs a sample"));
+  if (HycoBodyPartsShapes(parts, -1, shape) > HYCO_MOST_THETA) {
+    HycoFormat(line, "a model of bodies samples at most %d such parameters, and is none here", HYCO_MOST_THETA);
+    PetscCall(HycoListAdd(text, "; ", line));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
