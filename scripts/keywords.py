@@ -153,7 +153,7 @@ def lines_of(path, main, within=()):
     if os.path.realpath(path) in within:
         raise KeywordError(f"{path} includes itself")
     keyword, start = "", 0
-    with open(path, encoding="utf-8", errors="replace") as file:
+    with open(path, encoding="utf-8-sig", errors="replace") as file:
         for number, line in enumerate(file, 1):
             line = line.strip()
             if line.startswith("**") or not line:

@@ -51,13 +51,18 @@ static void Expect(Parser *p, const char word[])
 static void Ternary(Parser *p);
 
 /* In the order of function_of[]. */
-static const char *const functions[] = {"sin",  "cos",  "tan",   "asin",  "acos",  "atan", "sinh",
-                                        "cosh", "tanh", "asinh", "acosh", "atanh", "log2", "log10",
-                                        "log",  "ln",   "exp",   "sqrt",  "abs",   "rint"};
+static const char *const functions[] = {"sin",  "cos",   "tan",   "asin",  "acos",  "atan",  "sinh", "cosh",
+                                        "tanh", "asinh", "acosh", "atanh", "log2",  "log10", "log",  "ln",
+                                        "exp",  "sqrt",  "abs",   "rint",  "floor", "ceil",  "sign"};
 static const struct {
   const char *name;
   int op;
-} several[] = {{"min", LEAST}, {"max", GREATEST}, {"sum", BINARY + PLUS}};
+} several[] = {{"min", LEAST},
+               {"max", GREATEST},
+               {"sum", BINARY + PLUS},
+               {"atan2", BINARY + ATAN2},
+               {"hypot", BINARY + HYPOT},
+               {"mod", BINARY + MODULO}};
 
 static PetscBool Is(const char word[], const char name[], size_t n)
 {
@@ -68,7 +73,8 @@ static void Call(Parser *p, const char name[], size_t n)
 {
   int op = -1, of = -1;
 
-  for (int k = 0; k < 3; k++) of = Is(several[k].name, name, n) ? several[k].op : of;
+  for (int k = 0; k < (int)(sizeof(several) / sizeof(several[0])); k++)
+    of = Is(several[k].name, name, n) ? several[k].op : of;
   for (int k = 0; k < (int)(sizeof(functions) / sizeof(functions[0])); k++)
     op = Is(functions[k], name, n) ? UNARY + k : op;
   Ternary(p);

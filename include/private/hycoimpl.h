@@ -165,6 +165,11 @@ PetscErrorCode HycoSealFile(const char path[], size_t *size, unsigned char seal[
 /* Size of a file, and whether it has a seal; fails if it has one that does not match its bytes. */
 PetscErrorCode HycoSealCheck(const char path[], size_t *size, PetscBool *sealed);
 
+/* The text without the mark of UTF-8 (a byte order mark) with which spreadsheets and editors of Windows begin one. */
+static inline char *HycoSkipMark(char *text)
+{
+  return text + 3 * !strncmp(text, "\xef\xbb\xbf", 3);
+}
 /* strtod() with a decimal point, whatever the locale of the calling program. */
 double HycoNumber(const char text[], char **end);
 /* Between the two calls, this thread reads and writes numbers with a decimal point. */

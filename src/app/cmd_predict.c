@@ -175,69 +175,6 @@ static PetscErrorCode PrintReduced(const HycoPrediction *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One point: rank 0 predicts while the others wait; all solve full order if the fallback requires it, or with its
-   forces. */
-static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, const char output[], PetscBool derives)
-{
-  HycoPrediction p = {0};
-  HycoGradient gradient = {0};
-  HycoContactResult *own;
-  const HycoContactResult *carried;
-  PetscInt n, n_carried;
-  PetscReal mu[64], energy = 0;
-  char why[DRIVER_LINE], covered[64] = "";
-
-  PetscFunctionBegin;
-  PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
-  PetscCall(DriverGetPoint(scene, NULL, mu));
-  HycoOnRoot(PETSC_COMM_WORLD, HycoROMPredict(model, n, mu));
-  HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetPrediction(model, &p));
-  PetscCallMPI(MPI_Bcast(&p, sizeof(p), MPI_BYTE, 0, PETSC_COMM_WORLD));
-  PetscCall(DriverCheckLeftEarly());
-  DriverWantsFullOrder(fallback, &p, why);
-  if (why[0]) {
-    PetscCall(DriverSolveFullOrder(fallback, n, mu, &p));
-    PetscCall(DriverPrint("FULL ORDER instead of the reduced model: %s\n", why));
-  } else {
-    PetscCall(PrintReduced(&p));
-    if (fallback->displacement) {
-      PetscCall(DriverSolveDisplacement(fallback, model, n, mu, &p));
-      PetscCall(DriverPrint(
-          "one full-order solve with these forces: displacements of the whole mesh, residuals of full order\n"));
-    }
-  }
-  PetscCall(DriverCheckLeft());
-  HycoCheck(p.reason > 0, "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written",
-            p.why[0] ? p.why : HycoReasonName(p.reason), (double)p.kkt.stationarity, (double)p.kkt.penetration,
-            (double)p.kkt.adhesion, (double)p.kkt.complementarity);
-  /* After the check of convergence, which a gradient requires. */
-  if (derives) HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetGradient(model, &gradient));
-  if (output[0] && (why[0] || fallback->displacement))
-    PetscCall(HycoFOMWrite(fallback->fom, output));
-  else if (output[0])
-    HycoOnRoot(PETSC_COMM_WORLD, HycoROMWrite(model, output));
-  if (!why[0]) snprintf(covered, sizeof(covered), " (%.1f %% of it in the RID)", 100 * (double)p.covered_force);
-  PetscCall(DriverPrint("total contact force %.10g%s, %d of %d contacts active; %s after %d iterations\n",
-                        (double)p.total_contact_force, covered, (int)p.n_active, (int)p.n_all_contacts,
-                        HycoReasonName(p.reason), (int)p.iterations));
-  PetscCall(DriverPrint("KKT residuals: stationarity %.1e, penetration %.1e, adhesion %.1e, complementarity %.1e\n",
-                        (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
-                        (double)p.kkt.complementarity));
-  if (!why[0]) PetscCall(PrintEstimates(scene, &p, NULL));
-  PetscCall(DriverPrint("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
-  if (why[0] || fallback->displacement)
-    energy = fallback->strain_energy;
-  else
-    HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetStrainEnergy(model, &energy));
-  PetscCall(DriverGetCarried(model, scene, &n_carried, &own));
-  carried = own;
-  if (why[0]) PetscCall(HycoFOMGetContacts(fallback->fom, &n_carried, &carried));
-  PetscCall(Report(scene, mu, &p, n_carried, carried, energy, why, (PetscBool)(why[0] || fallback->displacement), NULL,
-                   derives ? &gradient : NULL));
-  PetscCall(PetscFree(own));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* One path: writes what it reached, and fails if that is not its end. */
 static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[], PetscBool derives)
 {
@@ -368,13 +305,8 @@ static PetscErrorCode ShapeOf(HycoROM model, HycoScene scene, Shape *s)
   s->own = n_times ? (residual ? N_COLUMNS : RESIDUAL) : PATH_FORCE;
   PetscCall(ReportColumns(scene, s->own, columns, &s->with_quantities, s->names));
   s->with_extremes = s->with_quantities;
-  for (PetscInt c = s->own; n_times && c < s->with_quantities; c++) {
-    char *name = s->path_name[c - s->own];
-
-    /* An output's extreme along the path beside its value at the end. */
-    PetscCall(PetscSNPrintf(name, DRIVER_LINE, "path_%s", s->names[c]));
-    s->names[s->with_extremes++] = name;
-  }
+  /* An output's extreme along the path beside its value at the end. */
+  if (n_times) PetscCall(ReportExtremes(s->own, s->names, &s->with_extremes, s->path_name));
   s->with_estimates = s->with_extremes;
   for (PetscInt c = s->own; c < s->with_quantities; c++) {
     char *name = s->estimate_name[c - s->own];
@@ -386,6 +318,15 @@ static PetscErrorCode ShapeOf(HycoROM model, HycoScene scene, Shape *s)
   for (PetscInt c = 0; c < s->carried.n_contacts * s->carried.each; c++) s->names[s->width++] = s->carried.name[c];
   s->with_carried = s->width;
   for (PetscInt c = 0; c < s->gradients.n; c++) s->names[s->width++] = s->gradients.name[c];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode DestroyShape(Shape *s)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree(s->carried.name));
+  PetscCall(PetscFree(s->gradients.name));
+  PetscCall(PetscFree(s->names));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -437,6 +378,98 @@ static void FillRow(const HycoPrediction *p, PetscInt n_carried, const HycoConta
 
     if (!known) v[c] = NAN;
   }
+}
+
+/* The table of a single point: a set's, with one row. whole: u is that of the whole mesh. gradient: NULL, or that of the
+   prediction, which rank 0 has. */
+static PetscErrorCode WriteRow(HycoROM model, HycoScene scene, const PetscReal mu[], const HycoPrediction *p,
+                               PetscInt n_carried, const HycoContactResult carried[], PetscBool full_order,
+                               PetscBool whole, const HycoGradient *gradient, const char table[])
+{
+  Shape s = {.gradients = {.on = (PetscBool)(gradient != NULL)}};
+  PetscReal *v;
+  DriverPiece all;
+  DriverRows rows;
+
+  PetscFunctionBegin;
+  PetscCall(ShapeOf(model, scene, &s));
+  PetscCall(PetscMalloc1(s.width, &v));
+  FillRow(p, n_carried, carried, &s, v);
+  v[FULL_ORDER] = full_order;
+  if (whole) v[U_NORM] = NAN; /* not that of an RID */
+  if (gradient && !HycoRank(PETSC_COMM_WORLD)) DriverGradientFill(&s.gradients, gradient, v + s.with_carried);
+  rows = DriverRowsOfRoot(1, s.width, v, &all);
+  PetscCall(DriverWriteTable(table, scene, mu, s.names, &rows));
+  PetscCall(PetscFree(v));
+  PetscCall(DestroyShape(&s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One point: rank 0 predicts while the others wait; all solve full order if the fallback requires it, or with its
+   forces. */
+static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, const char output[], PetscBool derives)
+{
+  HycoPrediction p = {0};
+  HycoGradient gradient = {0};
+  HycoContactResult *own;
+  const HycoContactResult *carried;
+  PetscInt n, n_carried;
+  PetscReal mu[64], energy = 0;
+  char why[DRIVER_LINE], covered[64] = "", table[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
+  PetscCall(DriverGetPoint(scene, NULL, mu));
+  PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
+  HycoOnRoot(PETSC_COMM_WORLD, HycoROMPredict(model, n, mu));
+  HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetPrediction(model, &p));
+  PetscCallMPI(MPI_Bcast(&p, sizeof(p), MPI_BYTE, 0, PETSC_COMM_WORLD));
+  PetscCall(DriverCheckLeftEarly());
+  DriverWantsFullOrder(fallback, &p, why);
+  if (why[0]) {
+    PetscCall(DriverSolveFullOrder(fallback, n, mu, &p));
+    PetscCall(DriverPrint("FULL ORDER instead of the reduced model: %s\n", why));
+  } else {
+    PetscCall(PrintReduced(&p));
+    if (fallback->displacement) {
+      PetscCall(DriverSolveDisplacement(fallback, model, n, mu, &p));
+      PetscCall(DriverPrint(
+          "one full-order solve with these forces: displacements of the whole mesh, residuals of full order\n"));
+    }
+  }
+  PetscCall(DriverCheckLeft());
+  HycoCheck(p.reason > 0, "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written",
+            p.why[0] ? p.why : HycoReasonName(p.reason), (double)p.kkt.stationarity, (double)p.kkt.penetration,
+            (double)p.kkt.adhesion, (double)p.kkt.complementarity);
+  /* After the check of convergence, which a gradient requires. */
+  if (derives) HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetGradient(model, &gradient));
+  if (output[0] && (why[0] || fallback->displacement))
+    PetscCall(HycoFOMWrite(fallback->fom, output));
+  else if (output[0])
+    HycoOnRoot(PETSC_COMM_WORLD, HycoROMWrite(model, output));
+  if (!why[0]) snprintf(covered, sizeof(covered), " (%.1f %% of it in the RID)", 100 * (double)p.covered_force);
+  PetscCall(DriverPrint("total contact force %.10g%s, %d of %d contacts active; %s after %d iterations\n",
+                        (double)p.total_contact_force, covered, (int)p.n_active, (int)p.n_all_contacts,
+                        HycoReasonName(p.reason), (int)p.iterations));
+  PetscCall(DriverPrint("KKT residuals: stationarity %.1e, penetration %.1e, adhesion %.1e, complementarity %.1e\n",
+                        (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
+                        (double)p.kkt.complementarity));
+  if (!why[0]) PetscCall(PrintEstimates(scene, &p, NULL));
+  PetscCall(DriverPrint("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
+  if (why[0] || fallback->displacement)
+    energy = fallback->strain_energy;
+  else
+    HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetStrainEnergy(model, &energy));
+  PetscCall(DriverGetCarried(model, scene, &n_carried, &own));
+  carried = own;
+  if (why[0]) PetscCall(HycoFOMGetContacts(fallback->fom, &n_carried, &carried));
+  if (table[0])
+    PetscCall(WriteRow(model, scene, mu, &p, n_carried, carried, (PetscBool)(why[0] != '\0'),
+                       (PetscBool)(why[0] || fallback->displacement), derives ? &gradient : NULL, table));
+  PetscCall(Report(scene, mu, &p, n_carried, carried, energy, why, (PetscBool)(why[0] || fallback->displacement), NULL,
+                   derives ? &gradient : NULL));
+  PetscCall(PetscFree(own));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Data for the rows of a piece. */
@@ -661,9 +694,7 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
   begin = HycoNow() - begin;
   if (output[0]) HycoOnRoot(PETSC_COMM_WORLD, HycoROMWriteMany(model, n, n_par, mu, output));
   PetscCall(ReportSet("predict", table, scene, samples, s.names, &rows, begin));
-  PetscCall(PetscFree(s.carried.name));
-  PetscCall(PetscFree(s.gradients.name));
-  PetscCall(PetscFree(s.names));
+  PetscCall(DestroyShape(&s));
   PetscCall(DriverRowsFree(&rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

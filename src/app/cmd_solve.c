@@ -152,37 +152,40 @@ static PetscErrorCode Path(HycoFOM fom, HycoScene scene, const PetscReal mu[], c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Not converged: nothing is written, neither fields nor report. */
-static PetscErrorCode One(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char output[], PetscBool derives)
-{
-  HycoSummary summary;
-  HycoGradient gradient;
-  PetscInt n;
-
-  PetscFunctionBegin;
-  PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
-  PetscCall(HycoFOMSolve(fom, n, mu));
-  PetscCall(HycoFOMGetSummary(fom, &summary));
-  PetscCall(DriverCheckLeft());
-  HycoCheck(summary.reason > 0, "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written", summary.why,
-            (double)summary.kkt.stationarity, (double)summary.kkt.penetration, (double)summary.kkt.adhesion,
-            (double)summary.kkt.complementarity);
-  /* Needs the factor of the solution, which is still there. */
-  if (derives) PetscCall(HycoFOMGetGradient(fom, &gradient));
-  if (output[0]) PetscCall(HycoFOMWrite(fom, output));
-  PetscCall(Report(scene, mu, fom, &summary, derives ? &gradient : NULL));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Columns of a set's table. */
-enum { FORCE, LAMBDA_MAX, ACTIVE, U_NORM, ENERGY, KKT, CONVERGED, ITERATIONS, SECONDS, N_COLUMNS };
-static const char *const columns[N_COLUMNS] = {
-    "total_contact_force", "lambda_max", "n_active", "u_norm2", "strain_energy", "kkt_max",
-    "converged",           "iterations", "seconds"};
+enum {
+  FORCE,
+  LAMBDA_MAX,
+  ACTIVE,
+  U_NORM,
+  ENERGY,
+  KKT,
+  CONVERGED,
+  ITERATIONS,
+  SECONDS,
+  PATH_FORCE, /* only for paths */
+  PATH_MISES,
+  PATH_INELASTIC,
+  N_COLUMNS
+};
+static const char *const columns[N_COLUMNS] = {"total_contact_force",
+                                               "lambda_max",
+                                               "n_active",
+                                               "u_norm2",
+                                               "strain_energy",
+                                               "kkt_max",
+                                               "converged",
+                                               "iterations",
+                                               "seconds",
+                                               "largest_contact_force",
+                                               "largest_mises",
+                                               "largest_inelastic"};
 
-/* The table of a set: these columns, the scene's quantities, the results of its contacts, gradients. */
+/* The table of a set: these columns (own: without those of paths), the scene's quantities, of paths at their end and
+   their extremes, the results of its contacts, gradients. */
 typedef struct {
-  PetscInt with_quantities, with_carried, width;
+  PetscInt own, with_quantities, with_extremes, with_carried, width;
+  char path_name[HYCO_MAX_QUANTITIES][DRIVER_LINE];
   DriverCarried carried;
   DriverGradients gradients;
   const char **names;
@@ -192,14 +195,20 @@ typedef struct {
 /* For n points, once dim is known. Room for all quantities first; the width is then that of the columns there are. */
 static PetscErrorCode CreateTable(HycoScene scene, PetscInt dim, PetscInt n, Table *t)
 {
+  PetscInt n_times;
+
   PetscFunctionBegin;
+  PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
   PetscCall(DriverCarriedColumns(scene, dim, &t->carried));
   PetscCall(DriverGradientColumns(scene, &t->gradients));
-  t->width = N_COLUMNS + HYCO_MAX_QUANTITIES + t->carried.n_contacts * t->carried.each + t->gradients.n;
+  t->width = N_COLUMNS + 2 * HYCO_MAX_QUANTITIES + t->carried.n_contacts * t->carried.each + t->gradients.n;
   PetscCall(PetscMalloc1(t->width, &t->names));
-  PetscCall(ReportColumns(scene, N_COLUMNS, columns, &t->with_quantities, t->names));
+  t->own = n_times ? N_COLUMNS : PATH_FORCE;
+  PetscCall(ReportColumns(scene, t->own, columns, &t->with_quantities, t->names));
+  t->with_extremes = t->with_quantities;
+  if (n_times) PetscCall(ReportExtremes(t->own, t->names, &t->with_extremes, t->path_name));
   /* Outputs are fewer than the room. */
-  t->width = t->with_quantities;
+  t->width = t->with_extremes;
   for (PetscInt c = 0; c < t->carried.n_contacts * t->carried.each; c++) t->names[t->width++] = t->carried.name[c];
   t->with_carried = t->width;
   for (PetscInt c = 0; c < t->gradients.n; c++) t->names[t->width++] = t->gradients.name[c];
@@ -217,38 +226,103 @@ static PetscErrorCode DestroyTable(Table *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What a path adds to the fixed columns, and sums or extremes over its listed times in place of the last one's. */
+static void FillPath(const HycoHistory *h, PetscReal v[])
+{
+  v[KKT] = v[ITERATIONS] = v[SECONDS] = v[PATH_FORCE] = v[PATH_MISES] = v[PATH_INELASTIC] = 0;
+  for (PetscInt k = 0; k < h->n; k++) {
+    const HycoStep *s = &h->step[k];
+
+    v[KKT] = PetscMax(v[KKT], s->kkt);
+    v[ITERATIONS] += s->iterations;
+    v[SECONDS] += s->seconds;
+    v[PATH_FORCE] = PetscMax(v[PATH_FORCE], s->total_contact_force);
+    v[PATH_MISES] = PetscMax(v[PATH_MISES], s->mises);
+    v[PATH_INELASTIC] = PetscMax(v[PATH_INELASTIC], s->inelastic);
+  }
+}
+
 /* The layout of a row: fixed columns, outputs of the scene, resultants of the contacts, derivatives. The same
    order as the names in the table. */
 static PetscErrorCode FillRow(HycoFOM fom, const HycoSummary *s, const Table *t, DriverLacking *lacking, PetscReal v[])
 {
   const HycoContactResult *carried;
   HycoGradient gradient;
+  HycoHistory h;
   PetscErrorCode caught;
   PetscInt n;
+  PetscBool solved;
 
   PetscFunctionBegin;
+  PetscCall(HycoFOMGetHistory(fom, &h));
+  solved = (PetscBool)(s->reason > 0 && (t->own == PATH_FORCE || h.ended));
   v[FORCE] = s->total_contact_force;
   v[LAMBDA_MAX] = s->lambda_max;
   v[ACTIVE] = s->n_active;
   v[U_NORM] = s->u_norm2;
   v[ENERGY] = s->strain_energy;
   v[KKT] = HycoKKTMax(&s->kkt);
-  v[CONVERGED] = s->reason > 0;
+  v[CONVERGED] = solved;
   v[ITERATIONS] = s->iterations;
   v[SECONDS] = s->seconds.total;
-  PetscCall(PetscArraycpy(v + N_COLUMNS, s->quantity, t->with_quantities - N_COLUMNS));
+  if (t->own > PATH_FORCE) FillPath(&h, v);
+  PetscCall(PetscArraycpy(v + t->own, s->quantity, t->with_quantities - t->own));
+  PetscCall(PetscArraycpy(v + t->with_quantities, h.path_quantity, t->with_extremes - t->with_quantities));
   PetscCall(HycoFOMGetContacts(fom, &n, &carried));
-  DriverCarriedFill(&t->carried, n, carried, v + t->with_quantities);
+  DriverCarriedFill(&t->carried, n, carried, v + t->with_extremes);
   /* A point that failed has no results, and its row stays. */
-  for (PetscInt c = 0; c < t->with_carried && s->reason <= 0; c++) {
-    if (c < KKT || c >= N_COLUMNS) v[c] = NAN;
+  for (PetscInt c = 0; c < t->with_carried && !solved; c++) {
+    if (c < KKT || c > SECONDS) v[c] = NAN;
   }
   for (PetscInt c = 0; c < t->gradients.n; c++) v[t->with_carried + c] = NAN;
-  if (!t->gradients.on || s->reason <= 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!t->gradients.on || !solved) PetscFunctionReturn(PETSC_SUCCESS);
   /* Its errors are raised on every rank. */
   PetscCall(HycoCatchBegin());
   caught = HycoFOMGetGradient(fom, &gradient);
   PetscCall(DriverGradientCatch(&t->gradients, &gradient, caught, lacking, v + t->with_carried));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The table of a single point: a set's, with one row. gradient: NULL, or that of the solution. */
+static PetscErrorCode WriteRow(HycoFOM fom, HycoScene scene, const PetscReal mu[], const HycoSummary *s,
+                               const HycoGradient *gradient, const char table[])
+{
+  Table t = {.gradients = {.on = (PetscBool)(gradient != NULL)}};
+  DriverPiece all;
+  DriverRows rows;
+
+  PetscFunctionBegin;
+  PetscCall(CreateTable(scene, s->dim, 1, &t));
+  t.gradients.on = PETSC_FALSE; /* it is known */
+  PetscCall(FillRow(fom, s, &t, NULL, t.value));
+  if (gradient) DriverGradientFill(&t.gradients, gradient, t.value + t.with_carried);
+  rows = DriverRowsOfRoot(1, t.width, t.value, &all);
+  PetscCall(DriverWriteTable(table, scene, mu, t.names, &rows));
+  PetscCall(DestroyTable(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Not converged: nothing is written, neither fields nor report. */
+static PetscErrorCode One(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char output[], const char table[],
+                          PetscBool derives)
+{
+  HycoSummary summary;
+  HycoGradient gradient;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
+  PetscCall(HycoFOMSolve(fom, n, mu));
+  PetscCall(HycoFOMGetSummary(fom, &summary));
+  PetscCall(DriverCheckLeft());
+  HycoCheck(summary.reason > 0, "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written", summary.why,
+            (double)summary.kkt.stationarity, (double)summary.kkt.penetration, (double)summary.kkt.adhesion,
+            (double)summary.kkt.complementarity);
+  /* Needs the factor of the solution, which is still there. */
+  if (derives) PetscCall(HycoFOMGetGradient(fom, &gradient));
+  if (output[0]) PetscCall(HycoFOMWrite(fom, output));
+  if (table[0]) PetscCall(WriteRow(fom, scene, mu, &summary, derives ? &gradient : NULL, table));
+  PetscCall(Report(scene, mu, fom, &summary, derives ? &gradient : NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -318,14 +392,13 @@ PetscErrorCode DeclareSolve(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -table is read for sets and paths alone: given for a single point it is reported as unused. */
 PetscErrorCode CommandSolve(void)
 {
   HycoScene scene;
   HycoSamples samples = NULL;
   HycoFOM fom;
   HycoSolver solver;
-  PetscBool monitor, derives, set;
+  PetscBool monitor, derives, set, checkpoint;
   PetscInt n_times;
   PetscReal mu[64];
   char path[PETSC_MAX_PATH_LEN], output[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN] = "";
@@ -339,20 +412,23 @@ PetscErrorCode CommandSolve(void)
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
   PetscCall(DriverReadGradient(&derives));
   PetscCall(DriverHasSamples(scene, &set));
-  /* One path gives a table already; several would need one each. */
-  if (set) PetscCall(HycoSceneRefuseHistory(scene, "a set of points"));
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-hyco_checkpoint", &checkpoint));
+  /* A series, and a checkpoint, are of one path. */
+  HycoCheck(!set || !n_times || (!output[0] && !checkpoint),
+            "%s of a scene with a history needs a single point (-mu); use -table for a set of points",
+            output[0] ? "-output" : "-hyco_checkpoint");
   if (set) {
     PetscCall(DriverGetSamples(scene, PETSC_FALSE, &samples, &set));
   } else
     PetscCall(DriverGetPoint(scene, NULL, mu));
-  if (set || n_times) PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
+  PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
   PetscCall(HycoFOMGetSolver(fom, &solver));
   /* The handle is the FOM's: options have been read by its creation. */
   if (monitor) PetscCall(HycoSolverSetMonitor(solver, DriverMonitor, NULL));
   HycoStaged(HYCO_STAGE_FULL_ORDER, set       ? Many(fom, scene, samples, output, table, derives)
                                     : n_times ? Path(fom, scene, mu, output, table, derives)
-                                              : One(fom, scene, mu, output, derives));
+                                              : One(fom, scene, mu, output, table, derives));
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSceneDestroy(&scene));

@@ -133,6 +133,9 @@ PetscErrorCode ReportQuantities(cJSON *json, HycoScene scene, const PetscReal va
 /* A table's columns: `n` of them, then the scene's quantities; names: room for HYCO_MAX_QUANTITIES more. */
 PetscErrorCode ReportColumns(HycoScene scene, PetscInt n, const char *const columns[], PetscInt *n_all,
                              const char *names[]);
+/* After these columns of outputs, names[n .. *n_all), their extremes along a path: "path_NAME", in extreme[]. */
+PetscErrorCode ReportExtremes(PetscInt n, const char *names[], PetscInt *n_all,
+                              char extreme[HYCO_MAX_QUANTITIES][DRIVER_LINE]);
 /* Adds numbers in this order: ReportNumbers(json, {"n_dof", n}, {"seconds", t}). */
 #define ReportNumbers(json, ...)                                                                                       \
   ReportNumbers_Private(json, (PetscInt)(sizeof((ReportNumber[]){__VA_ARGS__}) / sizeof(ReportNumber)),                \

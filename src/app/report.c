@@ -122,6 +122,20 @@ PetscErrorCode ReportColumns(HycoScene scene, PetscInt n, const char *const colu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For tables of paths, whose outputs are those of the end. */
+PetscErrorCode ReportExtremes(PetscInt n, const char *names[], PetscInt *n_all,
+                              char extreme[HYCO_MAX_QUANTITIES][DRIVER_LINE])
+{
+  const PetscInt outputs = *n_all - n;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < outputs; k++) {
+    PetscCall(PetscSNPrintf(extreme[k], DRIVER_LINE, "path_%s", names[n + k]));
+    names[(*n_all)++] = extreme[k];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Relative residuals that were recomputed from K, B, F and D, not what the solver believes. */
 void ReportKKT(cJSON *json, const HycoKKT *kkt)
 {

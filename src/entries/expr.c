@@ -2,6 +2,7 @@
 #include <hycosceneimpl.h>
 #include <muParserDLL.h>
 #include <ctype.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -112,6 +113,32 @@ static PetscErrorCode CheckNesting(HycoExpr e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static double Modulo(double a, double b)
+{
+  return a - b * floor(a / b);
+}
+
+/* Functions that muParser lacks. A parameter may have the name of one. */
+static void DefineFunctions(HycoExpr e, PetscInt n, const char *const names[])
+{
+  static const struct {
+    const char *name;
+    muFun1_t one;
+    muFun2_t two;
+  } functions[] = {{"floor", floor, NULL}, {"ceil", ceil, NULL}, {"mod", NULL, Modulo}, {"hypot", NULL, hypot}};
+
+  for (size_t k = 0; k < sizeof(functions) / sizeof(functions[0]); k++) {
+    PetscInt p = 0;
+
+    while (p < n && strcmp(names[p], functions[k].name)) p++;
+    if (p < n) continue;
+    if (functions[k].one)
+      mupDefineFun1(e->parser, functions[k].name, functions[k].one, 1);
+    else
+      mupDefineFun2(e->parser, functions[k].name, functions[k].two, 1);
+  }
+}
+
 /* A plain number does not need a parser. Variables are defined before the text is set, and the text is evaluated once, since
    muParser reports some errors only then. */
 static PetscErrorCode Parse(HycoExpr e, PetscInt n, const char *const names[])
@@ -130,6 +157,7 @@ static PetscErrorCode Parse(HycoExpr e, PetscInt n, const char *const names[])
   e->parser = mupCreate(muBASETYPE_FLOAT);
   mupSetErrorHandler(e->parser, Quiet);
   mupDefineConst(e->parser, "pi", PETSC_PI); /* muParser's own _pi has 12 digits */
+  DefineFunctions(e, n, names);
   for (int c = 0; c < 3; c++) mupDefineVar(e->parser, axis[c], &e->x[c]);
   mupDefineVar(e->parser, "temperature", &e->temperature);
   for (PetscInt p = 0; p < n; p++)

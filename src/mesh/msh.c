@@ -763,10 +763,11 @@ static PetscErrorCode ReadAll(Msh *m)
   size_t got;
 
   PetscFunctionBegin;
-  HycoCheckFile(file,
-            "the mesh %s cannot be opened; scripts/meshes makes the meshes of the examples, and gmsh -2 or -3 makes "
-            "one from a .geo file",
-            m->path);
+  HycoCheckFile(
+      file,
+      "the mesh %s cannot be opened; scripts/meshes makes the meshes of the examples, and gmsh -2 or -3 makes "
+      "one from a .geo file",
+      m->path);
   if (fseek(file, 0, SEEK_END) == 0) size = ftell(file);
   rewind(file);
   /* A directory has a negative or a huge size; both end in the message below, not in an error of PETSc. */
@@ -775,7 +776,7 @@ static PetscErrorCode ReadAll(Msh *m)
   fclose(file);
   HycoCheck(got && got == (size_t)size, "%s is not a gmsh mesh, or cannot be read", m->path);
   m->text[got] = '\0';
-  m->at = m->text;
+  m->at = HycoSkipMark(m->text);
   m->end = m->text + got;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

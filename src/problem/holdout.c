@@ -283,13 +283,20 @@ PetscErrorCode HycoSamplesUnseen(HycoSamples samples, PetscInt first, PetscInt c
   PetscReal point[HYCO_MAX_PARAMETERS];
   PetscInt n;
   const PetscReal *mu;
+  PetscBool point_alone = PETSC_TRUE;
   HycoScene scene;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, &d.n_par, &mu));
   PetscCall(HycoSamplesGetScene(samples, &scene));
-  /* Within the training's reach: the drawn points are to judge interpolation, which is all that a model promises. */
+  /* Within the training's reach: the drawn points are to judge interpolation, which is all that a model promises. The
+     reach of one point has no other: within the ranges. */
   PetscCall(HycoSamplesReach(scene, n, mu, d.lo, d.hi));
+  for (PetscInt p = 0; p < d.n_par; p++) point_alone = (PetscBool)(point_alone && d.lo[p] == d.hi[p]);
+  for (PetscInt p = 0; p < d.n_par && point_alone; p++) {
+    d.lo[p] = scene->lo[p];
+    d.hi[p] = scene->hi[p];
+  }
   PetscCall(HycoSamplesCreate(scene, unseen));
   d.drawn = *unseen;
   FindAxes(d.n_par, d.lo, d.hi, slow, &d.axes);

@@ -208,7 +208,7 @@ static PetscErrorCode ReadLines(HycoSamples s, const char path[], FILE *file)
 
     number++;
     if (number == 1) {
-      PetscCall(ReadHeader(s, path, line, column));
+      PetscCall(ReadHeader(s, path, HycoSkipMark(line), column));
       continue;
     }
     /* Blank lines, such as one at the end of a file, are no points. */

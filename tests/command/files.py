@@ -2,12 +2,14 @@
 import glob
 import os
 import shutil
+import subprocess
+import sys
 import unittest
 
 import h5py
 import numpy as np
 
-from common import ROPE, Case
+from common import ROPE, SOURCE, Case
 
 KEYS = ('n_samples', 'n_modes', 'n_dual_modes', 'n_fe_dofs', 'rid_nodes', 'rid_elements', 'rid_a_nodes', 'rid_contacts',
         'condition', 'training_error_u', 'training_error_lambda_rid')
@@ -26,6 +28,22 @@ class Files(Case):
         for name in os.listdir(self.folder):
             path = self.path(name)
             shutil.rmtree(path) if os.path.isdir(path) else os.remove(path)
+
+    def test_marks(self):
+        """The byte order mark with which spreadsheets and editors begin a file: of points, of a scene, of a mesh, of a deck."""
+        mark = '\ufeff'
+        shutil.copytree(ROPE, self.path('scene'))
+        for name in ('rope.msh', 'scene.yaml'):
+            with open(self.path('scene', name), 'r+', encoding='utf-8') as f:
+                text = f.read()
+                f.seek(0)
+                f.write(mark + text)
+        for name, text in (('points.csv', 'mu1,mu2\n0.07,0.17\n'),
+                           ('deck.inp', '*NODE\n1,0,0\n2,1,0\n3,0,1\n*ELEMENT, TYPE=CPE3, ELSET=part\n1,1,2,3\n')):
+            with open(self.path(name), 'w', encoding='utf-8') as f:
+                f.write(mark + text)
+        self.assertEqual(self.hyco('solve', '-scene', 'scene', '-points', 'points.csv')['not_converged'], 0)
+        subprocess.run([sys.executable, os.path.join(SOURCE, 'scripts', 'convert'), 'deck.inp', 'deck.msh'], cwd=self.folder, check=True, capture_output=True)
 
     def test_model_alone(self):
         """predict from a copy of the model, with scene and mesh gone and from another folder."""

@@ -70,6 +70,13 @@ def fits(value, node, path, found):
         fits(one, inner, f'{path}.{key if named else "NAME"}', found)
 
 
+def row_of(path):
+    """The numbers of the one row of a table."""
+    with open(path, encoding='utf-8') as f:
+        row, = csv.DictReader(f)
+    return {name: float(value) for name, value in row.items()}
+
+
 class Output(Case):
     newcomer = True
 
@@ -90,13 +97,14 @@ class Output(Case):
         punch = cls.changed('block/scene.yaml', RIGID, ())
         blocks = os.path.join(EXAMPLES, 'blocks')
         runs = [('check', ['check', '-scene', ROPE, '-check_solve']), ('check', ['check', '-scene', os.path.join(EXAMPLES, 'rod')]), ('check', ['check', '-scene', blocks]),
-                ('solve', ['solve', '-scene', ROPE, '-mu', '0.07,0.17', '-output', 'rope.xdmf']), ('solve', ['solve', '-scene', punch, '-mu', '20', '-gradient', '-output', 'punch.xdmf']),
+                ('solve', ['solve', '-scene', ROPE, '-mu', '0.07,0.17', '-output', 'rope.xdmf']), ('solve', ['solve', '-scene', punch, '-mu', '20', '-gradient', '-output', 'punch.xdmf', '-table', 'solve-one.csv']),
                 ('solve', ['solve', '-scene', pad, '-mu', '0.3', '-output', 'pad.xdmf', '-table', 'solve-path.csv', '-gradient']),
+                ('solve', ['solve', '-scene', pad, '-values_mu', '0.3', '-table', 'solve-paths.csv', '-gradient']),
                 ('solve', ['solve', '-scene', blocks, '-contact_under_type', 'mortar', '-mu', '0.05,0.05', '-output', 'blocks.xdmf']),
                 ('solve', ['solve', '-scene', blocks, '-grid', '2,2', '-table', 'solve-set.h5', '-output', 'set.xdmf']),
                 ('train', ['train', *TRAINED, '-target_u', '0.1', '-model', 'model.h5', '-table', 'train-search.csv']),
                 ('train', ['train', '-scene', ROPE, '-greedy', '-training_grid', '4,4', '-max_snapshots', '8', '-hyco_model_type', 'hybrid', '-model', 'greedy.h5', '-table', 'train-greedy.csv']),
-                ('predict', ['predict', '-model', 'model.h5', '-mu', '0.07,0.17', '-gradient', '-output', 'rope-p.xdmf']), ('predict', ['predict', '-model', 'greedy.h5', '-mu', '0.07,0.17', '-output', 'rid.xdmf']),
+                ('predict', ['predict', '-model', 'model.h5', '-mu', '0.07,0.17', '-gradient', '-output', 'rope-p.xdmf', '-table', 'predict-one.csv']), ('predict', ['predict', '-model', 'greedy.h5', '-mu', '0.07,0.17', '-output', 'rid.xdmf']),
                 ('predict', ['predict', '-model', 'model.h5', '-grid', '3,3', '-gradient', '-table', 'predict-set.h5']),
                 ('fit', ['fit', '-model', 'model.h5', '-target_most', '0.4', *TRAINED[:4]]),
                 ('compare', ['compare', *TRAINED[:4], '-model', 'model.h5', '-grid', '2,2', '-table', 'compare.csv'])]
@@ -105,7 +113,7 @@ class Output(Case):
 
     def columns(self, of):
         """The columns of a kind of table, as expressions for the names in them."""
-        names = {'PARAMETER': 'mu|mu1|mu2|crown|press', 'OUTPUT': 'pull|low|peak|heat|turn|touch|most', 'CONTACT': 'floor|ground|under', 'ERROR': r'\w+'}
+        names = {'PARAMETER': 'mu|mu1|mu2|crown|press|load', 'OUTPUT': 'pull|low|peak|heat|turn|touch|most|depth|push', 'CONTACT': 'floor|ground|under|punch', 'ERROR': r'\w+'}
         return [''.join(f'({names[word]})' if word in names else re.escape(word) for word in re.split('(PARAMETER|OUTPUT|CONTACT|ERROR)', row[2]))
                 for row in self.list if row[0] == 'table' and (row[1] in ('all', *of) or set(of) & set(row[1].split()) and ' of ' not in row[1] and '-' not in row[1])]
 
@@ -137,7 +145,8 @@ class Output(Case):
 
     def test_tables(self):
         """Columns of tables, as .csv and as datasets of one dimension, are in the list."""
-        for name, of in (('solve-path.csv', ('path', 'path of solve')), ('solve-set.h5', ('solve',)), ('predict-set.h5', ('predict',)), ('train-search.csv', ('train',)),
+        for name, of in (('solve-path.csv', ('path', 'path of solve')), ('solve-set.h5', ('solve',)), ('solve-one.csv', ('solve',)), ('solve-paths.csv', ('solve',)),
+                         ('predict-set.h5', ('predict',)), ('predict-one.csv', ('predict',)), ('train-search.csv', ('train',)),
                          ('train-greedy.csv', ('train -greedy',)), ('compare.csv', ('compare',))):
             if name.endswith('.h5'):
                 with h5py.File(self.path(name)) as f:
@@ -175,6 +184,22 @@ class Output(Case):
             units = {name: data.attrs['unit'] for name, data in f['step-0001/nodes'].items() if 'unit' in data.attrs}
             self.assertEqual({row[2].split('/')[1]: {'length': b'mm', 'force': b'N', 'stress': b'MPa'}[row[4]] for row in self.list
                               if row[2].startswith('nodes/') and row[4] != '-'}, units)
+
+    def test_rows(self):
+        """The row of a single point and of a path have the numbers of their reports; those of a path beside its largest ones."""
+        reports = {command: [report for name, report in self.reports if name == command] for command in ('solve', 'predict')}
+        for name, report in (('solve-one.csv', reports['solve'][1]), ('solve-paths.csv', reports['solve'][2]), ('predict-one.csv', reports['predict'][0])):
+            row = row_of(self.path(name))
+            self.assertEqual(row['converged'], 1)
+            self.near(row['total_contact_force'], report['total_contact_force'], 1e-6, name)
+            for key, value in report['outputs'].items():
+                self.near(row[key], value, 1e-6, key)
+                for p, slope in report.get('gradient', {}).get(key, {}).items():
+                    self.near(row[f'd_{key}_d_{p}'], slope, 1e-6, key)
+        path = reports['solve'][2]['history']
+        self.near(row_of(self.path('solve-paths.csv'))['largest_mises'], max(path['mises']), 1e-6)
+        for key, values in path['outputs'].items():
+            self.near(row_of(self.path('solve-paths.csv'))['path_' + key], (min if key == 'low' else max)(values), 1e-6, key)
 
     def test_page(self):
         """docs/output.md and the schema are what scripts/output-page writes."""

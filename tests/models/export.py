@@ -41,7 +41,7 @@ output:
 PAD = ("""
 scene: {title: a pad on two plates, mesh: drawn_pad.msh, parameters: [press, lift, soft, weight]}
 parameter: {press: {range: [0.01, 0.05]}, lift: {range: [0, 0.02]}, soft: {range: [1, 2]}, weight: {range: [0, 1]}}
-constant: {half: 4^-2^-1, pressure: "min(half, half*weight^2, 2) - -2^2*1e-2*(weight > 0.5 && rint(weight) == 1 ? exp(-weight) : log10(1 + weight))"}
+constant: {half: 4^-2^-1, pressure: "min(half, half*weight^2, 2) - -2^2*1e-2*(weight > 0.5 && rint(weight) == 1 ? exp(-weight) : log10(1 + weight)) + 1e-3*(hypot(weight, 1) + atan2(weight, 2) + sign(weight + 9) + floor(weight/99) + ceil(weight/99) + mod(weight/99, 9))"}
 body:
   plate: {young: "soft < 1.5 ? 500*soft : 10^(soft + 1)", poisson: 0.3}
   pad: {young: 100, poisson: 0.3, map: {x: 1.1*x + 0.1, y: 0.9*y, z: z}}

@@ -88,6 +88,11 @@ class Reduced(Case):
         self.alike(named['error_u'], listed['error_u'])
         self.assertGreater(one['error_u']['max'], 0)
 
+    def test_one_training_point(self):
+        """A training with one point is judged at points of the ranges."""
+        report = self.hyco('train', '-scene', ROPE, '-grid', '1,1', '-hyco_validation', 3, '-model', 'one.h5', status=None)
+        self.assertEqual((report['n_samples'], report['held_out']['n']), (1, 3))
+
     def test_some_fail(self):
         """A set with points that do not converge: the table has all, the last line gives their number, and the status is not 0."""
         for command, where, its in (('predict', ('-model', 'rope.h5'), 5), ('solve', ('-scene', ROPE), 1)):

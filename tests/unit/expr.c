@@ -39,6 +39,9 @@ static PetscErrorCode TestValues(void)
       {"sqrt(a^2+16)", 5},
       {"exp(1)", 2.718281828459045},
       {"abs(y)", 2},
+      {"floor(y/3) + ceil(x)", 0},
+      {"mod(y, 1.5)", 1},
+      {"hypot(a, 4)", 5},
   };
   PetscReal value;
 

@@ -18,13 +18,22 @@ enum {
   GT,
   AND,
   OR,
+  ATAN2,
+  HYPOT,
+  MODULO,
   BINARY = 16,
   UNARY = 32,
   DEPTH = 64
 }; /* BINARY + TIMES, ... */
 
-static double (*const function_of[])(double) = {sin,   cos,   tan,  asin,  acos, atan, sinh, cosh, tanh, asinh,
-                                                acosh, atanh, log2, log10, log,  log,  exp,  sqrt, fabs, rint};
+static inline double sign_of(double a)
+{
+  return (a > 0) - (a < 0);
+}
+
+static double (*const function_of[])(double) = {sin,  cos,   tan,   asin,  acos,  atan,  sinh,   cosh,
+                                                tanh, asinh, acosh, atanh, log2,  log10, log,    log,
+                                                exp,  sqrt,  fabs,  rint,  floor, ceil,  sign_of};
 
 static inline double apply(int op, double a, double b)
 {
@@ -57,6 +66,12 @@ static inline double apply(int op, double a, double b)
     return a > b;
   case BINARY + AND:
     return a != 0 && b != 0;
+  case BINARY + ATAN2:
+    return atan2(a, b);
+  case BINARY + HYPOT:
+    return hypot(a, b);
+  case BINARY + MODULO:
+    return a - b * floor(a / b);
   default:
     return a != 0 || b != 0;
   }
