@@ -42,6 +42,8 @@ typedef struct {
 
 typedef struct {
   const char *name, *type, *slave, *master; /* groups; master NULL: none */
+  PetscBool quadratic;                      /* cells of second order */
+  PetscInt n_slaves;                        /* nodes of the slave group */
   PetscInt n, facing_min, facing_max; /* number of contacts; of those that may close, the smallest and largest number */
   PetscReal gap_min, gap_max;         /* gaps of those that may close; max < min: no contact may close */
   PetscReal buried;     /* HycoSummary.buried: the largest share of an extent, at any of the points; 0: none */

@@ -73,12 +73,28 @@ typedef struct {
 } HycoShear;
 enum { HYCO_OPEN, HYCO_STICK, HYCO_SLIP };
 
+/* A contact's side (HycoPairs) is one of those of its node, or HYCO_ONE_SIDE; with a mask of the facets that count, where
+   others face nothing, it is 4 mask + side + 1. */
+enum { HYCO_MASK_BITS = 28 };
+static inline PetscInt HycoSideOf(PetscInt side)
+{
+  return side > HYCO_SIDES ? side % (HYCO_SIDES + 1) - 1 : side;
+}
+/* Whether a facet counts: of this side and rank at the node. */
+static inline PetscBool HycoSideCounts(PetscInt side, PetscInt facet_side, PetscInt facet_rank)
+{
+  const PetscInt own = HycoSideOf(side), mask = side > HYCO_SIDES ? side / (HYCO_SIDES + 1) : 0;
+
+  if (own != HYCO_ONE_SIDE && own != facet_side) return PETSC_FALSE;
+  return (PetscBool)(!mask || (facet_rank < HYCO_MASK_BITS && (mask >> facet_rank & 1)));
+}
+
 typedef struct _n_HycoPairs {
   PetscInt n;
   PetscInt *slave;   /* node indices */
   PetscInt *contact; /* index in scene->contact */
-  PetscInt *side;    /* of a slave on an edge: the side of the surface whose normal and area are the contact's, else
-                        HYCO_ONE_SIDE, as where the scene gives the normal */
+  PetscInt *side;    /* HycoSideOf() of a slave on an edge: the side of the surface whose normal and area are the
+                        contact's, else HYCO_ONE_SIDE, as where the scene gives the normal */
   PetscInt *master_start, *master;
   PetscReal *weight;
   PetscInt

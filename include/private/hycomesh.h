@@ -119,6 +119,9 @@ struct _n_HycoMesh {
   PetscInt
       *facet_side; /* n_facets x nf: the side of its group's edge at the node, as drawn, HYCO_ONE_SIDE or HYCO_NO_SIDE;
                             NULL until HycoSurfaceSides() */
+  PetscInt
+      *facet_rank; /* n_facets x nf: its place among the facets of its group around the node, by tags; with facet_side,
+                            of groups with edges */
   PetscInt *facet_point; /* of a submesh: the point of the DM that is a facet without its cell, else -1; or NULL */
   /* cell groups that are no body (regions): cells of group g as CSR over groups */
   PetscInt *group_cell_start, *group_cell;

@@ -167,9 +167,9 @@ PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, const PetscRe
     PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &g));
     PetscCall(Shares(fe, g, share));
     for (PetscInt i = k; i < next; i++) area[i] = share[pairs->slave[i]];
-    PetscCall(HycoSideSums(fe, g, next - k, pairs->slave + k, pairs->side + k, NULL, area + k));
     if (!HycoContactAverages(c))
       PetscCall(HycoSidesFacing(fe, g, next - k, pairs->slave + k, normal + 3 * k, NULL, area + k));
+    PetscCall(HycoSideSums(fe, g, next - k, pairs->slave + k, pairs->side + k, NULL, area + k));
   }
   PetscCall(PetscFree(share));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -22,6 +22,8 @@ PetscErrorCode HycoPairsEdges(HycoFE fe, const HycoPairs *pairs, PetscInt index,
    goes round an edge those of which a side leaves along it. The caller frees both arrays. */
 PetscErrorCode HycoContactSlaves(HycoFE fe, const HycoPairs *pairs, PetscInt index, PetscInt *n, PetscInt **slave,
                                  PetscInt **side);
+/* Masks the facets that face nothing around the slaves of contact `index`, whose pairs begin with `first`. */
+PetscErrorCode HycoPairsMask(HycoFE fe, PetscInt index, PetscInt first, HycoPairs *pairs);
 /* The nodes of a group with several sides: HYCO_SIDES * node + side, ascending; the caller frees them. */
 PetscErrorCode HycoSurfaceSlots(HycoFE fe, PetscInt group, PetscInt *n, PetscInt **slot);
 /* For nodes with a side: the sum of n dS (n x 3) and the area of the facets of that side; other entries stay. Either may

@@ -62,7 +62,6 @@ PetscErrorCode HycoContactsFacts(MPI_Comm comm, HycoScene scene, HycoMesh part, 
 /* Marks contacts whose masters are searched again after each motion, and sets the room for their masters. */
 PetscErrorCode HycoPairsSetSearch(HycoScene scene, HycoMesh m, HycoPairs *pairs)
 {
-
   PetscFunctionBegin;
   pairs->room = 0;
   pairs->n_searches = scene->n_contacts;
@@ -266,8 +265,10 @@ static PetscErrorCode FindAll(HycoFE fe, HycoPairs *pairs)
   PetscCall(CountHeld(scene, fe->mesh, held));
   for (PetscInt k = 0; k < scene->n_contacts && !ierr; k++) {
     HycoContact c = scene->contact[k];
+    const PetscInt first = pairs->n;
 
     ierr = c->ops->setup ? (*c->ops->setup)(c, fe, k, pairs) : AppendNodes(fe, k, held, pairs);
+    if (!ierr) ierr = HycoPairsMask(fe, k, first, pairs);
   }
   if (!ierr) ierr = HycoPairsDropTied(scene, fe->mesh, pairs);
   if (!ierr) ierr = CheckSlaves(scene, fe->mesh, held, pairs);

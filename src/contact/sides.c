@@ -17,7 +17,7 @@ typedef struct {
   HycoMesh m;
   PetscInt n, *place;
   const PetscReal *normal; /* by place, of length 1, as drawn; 0: on the axis of revolution, where no surface is */
-  PetscInt *side;          /* by place */
+  PetscInt *side, *rank;   /* by place */
 } Star;
 
 /* Of the drawing: the contacts and their order do not depend on the parameters. */
@@ -119,6 +119,33 @@ static int CompareCorners(const void *a, const void *b)
   return (p->place > q->place) - (p->place < q->place);
 }
 
+/* The ranks at the nodes of groups that have an edge. */
+static PetscErrorCode RankFacets(Star *s, const Corner corner[])
+{
+  HycoMesh m = s->m;
+  const PetscInt n = m->n_facets * m->nf;
+  PetscBool *edge;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(m->n_groups, &edge));
+  for (PetscInt k = 0; k < n; k++) edge[m->facet_group[k / m->nf]] |= s->side[k] >= 0;
+  for (PetscInt k = 0; k < n; k++) {
+    const Corner *of = &corner[k];
+
+    for (PetscInt way = -1; way <= 1 && edge[of->group]; way += 2) {
+      for (PetscInt j = k + way; j >= 0 && j < n && corner[j].group == of->group && corner[j].node == of->node;
+           j += way) {
+        PetscBool before;
+
+        PetscCall(Precedes(m, corner[j].place, of->place, &before));
+        s->rank[of->place] += before;
+      }
+    }
+  }
+  PetscCall(PetscFree(edge));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Node by node of each group. */
 static PetscErrorCode FindSides(Star *s, Corner corner[])
 {
@@ -137,6 +164,7 @@ static PetscErrorCode FindSides(Star *s, Corner corner[])
     PetscCall(DivideNode(s));
   }
   s->place = place;
+  PetscCall(RankFacets(s, corner));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -152,10 +180,12 @@ PetscErrorCode HycoSurfaceSides(HycoScene scene, HycoMesh m)
   if (m->facet_side || m->dim == 1) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc3(n, &s.place, 3 * n, &normal, n, &corner));
   PetscCall(PetscMalloc1(n + 1, &s.side));
+  PetscCall(PetscCalloc1(n + 1, &s.rank));
   PetscCall(FindNormals(scene, m, normal));
   s.normal = normal;
   PetscCall(FindSides(&s, corner));
   m->facet_side = s.side;
+  m->facet_rank = s.rank;
   PetscCall(PetscFree3(s.place, normal, corner));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -265,7 +295,8 @@ static PetscErrorCode AddFacets(Sums *s, PetscInt group, PetscBool tied)
 
         if (tied && at >= 0) AddTied(s, at, el->N[q][a], n);
         for (PetscInt k = tied ? -1 : s->head[node]; k >= 0; k = s->next[k]) {
-          if (s->side[k] == m->facet_side[f * m->nf + a]) AddPart(s, k, node, el->N[q][a], n, 1);
+          if (HycoSideCounts(s->side[k], m->facet_side[f * m->nf + a], m->facet_rank[f * m->nf + a]))
+            AddPart(s, k, node, el->N[q][a], n, 1);
         }
       }
     }

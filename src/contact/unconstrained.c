@@ -65,7 +65,7 @@ static PetscErrorCode SlaveSenses(Shapes *s, PetscInt contact, PetscInt layer, P
   for (PetscInt i = 0; i < n_nodes; i++) side[i] = HYCO_ONE_SIDE;
   for (PetscInt i = 0; i < s->m; i++) {
     if (p->contact[i] != contact) continue;
-    if (LayerOf(p, i) == layer) side[WideNode(s, p->slave[i])] = p->side[i];
+    if (LayerOf(p, i) == layer) side[WideNode(s, p->slave[i])] = HycoSideOf(p->side[i]);
     *more = (PetscBool)(*more || LayerOf(p, i) > layer);
   }
   PetscCall(HycoMeshFindGroup(s->wide->mesh, "contact", s->fe->scene->contact[contact]->slave, &g));

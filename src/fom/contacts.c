@@ -303,7 +303,7 @@ static PetscErrorCode NumberContacts(HycoFOM f)
   /* 64 bits: contacts times nodes exceed an int. */
   for (PetscInt k = 0; k < p->n; k++) {
     key[k] = (PetscInt64)p->contact[k] * f->part->n_whole_nodes + f->surface->node_whole[p->slave[k]];
-    key[k] = (HYCO_SIDES + 1) * key[k] + p->side[k] + 1; /* HYCO_ONE_SIDE: 0 */
+    key[k] = (HYCO_SIDES + 1) * key[k] + HycoSideOf(p->side[k]) + 1; /* HYCO_ONE_SIDE: 0 */
   }
   PetscCall(HycoRankKeys(HycoComm(f), p->n, key, p->number, &f->n_contacts));
   PetscCall(PetscFree(key));

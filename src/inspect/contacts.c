@@ -1,5 +1,6 @@
 /* Gaps, whether surfaces face each other, which side of contacts and ties has the finer facets. */
 #include "inspect.h"
+#include <hycocarriers.h>
 
 /* Share of the mesh's extent: a smaller gap is round-off. */
 #define ROUNDING 1e-12
@@ -137,8 +138,12 @@ PetscErrorCode HycoInspectGaps(HycoInspection *in, HycoFE fe, PetscBool first)
   PetscCall(HycoContactBuried(PETSC_COMM_SELF, fe, fe, p, gap, share));
   for (PetscInt c = 0; c < s->n_contacts; c++) {
     HycoContactInspection *r = &in->contact[c];
-    PetscInt facing = 0;
+    PetscInt facing = 0, g = 0;
 
+    PetscCall(HycoMeshFindGroup(fe->mesh, "contact", s->contact[c]->slave, &g));
+    /* Where some nodes of a facet carry no contact anyway, they are not compared. */
+    r->n_slaves = HycoMeshFirstCarrier(fe->mesh) ? 0 : fe->mesh->group_start[g + 1] - fe->mesh->group_start[g];
+    r->quadratic = HycoMeshIsQuadratic(fe->mesh);
     r->n = 0;
     r->buried = PetscMax(r->buried, share[c]);
     for (PetscInt k = 0; k < p->n; k++) {

@@ -24,7 +24,7 @@ static PetscErrorCode FreeTables(void *tables)
   HycoFreeAll(&m->group_name, &m->group_dim, &m->group_start, &m->group_node, &m->group_cell_start, &m->group_cell,
               &m->xyz, &m->node_id, &m->node_body, &m->node_global, &m->node_whole, &m->node_point, &m->cell_point,
               &m->cells, &m->cell_id, &m->cell_body, &m->cell_whole, &m->facets, &m->facet_group, &m->facet_cell,
-              &m->facet_point, &m->facet_side);
+              &m->facet_point, &m->facet_side, &m->facet_rank);
   PetscCall(HycoMeshSetTies(m, NULL));
   PetscCall(PetscFree(m));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -54,7 +54,7 @@ static PetscErrorCode MoveSides(HycoH5 h, HycoPairs *p)
     if (HycoH5Reads(h)) p->side[k] = HYCO_ONE_SIDE;
     any = (PetscBool)(any || p->side[k] != HYCO_ONE_SIDE);
   }
-  if (HycoH5Reads(h) ? !p->side : any) PetscCall(HycoH5Int(h, name, HYCO_ONE_SIDE, HYCO_SIDES - 1, &p->n, 1, &p->side));
+  if (HycoH5Reads(h) ? !p->side : any) PetscCall(HycoH5Int(h, name, HYCO_ONE_SIDE, PETSC_MAX_INT, &p->n, 1, &p->side));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
