@@ -36,8 +36,8 @@ PetscReal HycoDirectOperations(HycoDirect direct);
 PetscErrorCode HycoDirectFactor(HycoDirect direct, Mat K, Mat Bt, Mat B, PetscReal S[], PetscBool *singular);
 /* g = D - B K^-1 F on every rank; D (length m) is read on rank 0. v: the motions that are
    pinned, whose work is told from round-off as HycoMotionClean() does; NULL: it is left. */
-PetscErrorCode HycoDirectReduce(HycoDirect direct, const Vec v[], PetscReal least, Vec F, const PetscReal D[],
-                                PetscReal g[]);
+PetscErrorCode HycoDirectReduce(HycoDirect direct, const Vec v[], const PetscReal stiffness[], PetscReal least, Vec F,
+                                const PetscReal D[], PetscReal g[]);
 /* The null space of K: its vectors, borrowed. */
 PetscErrorCode HycoKernelVectors(Mat K, PetscInt *n, const Vec *v[]);
 /* x = K^-1 (F - Bt L) with the F of the last HycoDirectReduce(); L (length m) is read on rank 0. */
@@ -69,9 +69,9 @@ PetscErrorCode HycoMotionAtPins(PetscInt n, const Vec v[], const PetscInt pinned
 PetscErrorCode HycoMotionRows(Mat B, PetscInt p, const Vec z[], Vec work, PetscReal A[]);
 /* w[i], the same on every rank: the work of F on the combination of the n motions v that moves the unknown pinned[i] by 1 and
    none of the others. It is set to 0 where it is round-off of its terms, or below `least` (of a force on the largest
-   displacement of the motion). Collective. */
-PetscErrorCode HycoMotionClean(PetscInt n, const Vec v[], const PetscInt pinned[], Vec F, PetscReal least,
-                               PetscReal w[]);
+   displacement of the motion), unless springs resist the motion. stiffness[n]: theirs; NULL: there are none. Collective. */
+PetscErrorCode HycoMotionClean(PetscInt n, const Vec v[], const PetscReal stiffness[], const PetscInt pinned[], Vec F,
+                               PetscReal least, PetscReal w[]);
 
 /* place[i] on rank 0: position of unknown i (of n) in a fill-reducing order of K. Collective. */
 PetscErrorCode HycoDissection(MPI_Comm comm, Mat K, PetscInt place[]);

@@ -7,8 +7,7 @@
 #include <hycosolver.h>
 
 /* Orthonormal motions, of bodies that contact alone holds or springs softer than the bodies, which the dual form of a
-   system with cones takes as unknowns of their own. stiffness: of the springs on each, 0 without; -1: to be taken from
-   K. */
+   system with cones takes as unknowns of their own. stiffness: of the springs on each, 0 without. */
 typedef struct {
   PetscInt n;
   Vec *v;
@@ -38,8 +37,8 @@ PetscErrorCode HycoSystemCheckBlocks(HycoSystem system);
 void HycoSystemSetRounding(HycoSystem system, PetscReal rounding);
 /* Sets the motions, which stay the caller's; NULL: those of K's null space. */
 void HycoSystemSetSoft(HycoSystem system, const HycoSoft *soft);
-/* The motions whose unknowns the dual form pins: K's null space, or the soft ones. Borrowed. */
-PetscErrorCode HycoSystemMotions(HycoSystem system, PetscInt *n, const Vec *v[]);
+/* The motions whose unknowns the dual form pins: K's null space (*stiffness NULL), or the soft ones. Borrowed. */
+PetscErrorCode HycoSystemMotions(HycoSystem system, PetscInt *n, const Vec *v[], const PetscReal *stiffness[]);
 /* Their number. */
 PetscErrorCode HycoSystemPinned(HycoSystem system, PetscInt *n);
 /* Pins them. Collective. */

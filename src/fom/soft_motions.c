@@ -6,8 +6,7 @@
 #include <hycofomimpl.h>
 #include <petscblaslapack.h>
 
-#define SOFT  1e-4 /* stiffness of a motion relative to that of K's diagonal: above, K^-1 is accurate */
-#define EXACT 1e-8 /* the same: below, that of the springs is more accurate than K's Schur complement */
+#define SOFT 1e-4 /* stiffness of a motion relative to that of K's diagonal: above, K^-1 is accurate */
 
 /* E = V^T K_s V for the springs' K_s and the n motions of one part from `first` on, on every rank. */
 static PetscErrorCode SpringEnergy(HycoFOM f, const HycoMotions *motions, PetscInt first, PetscInt n, PetscReal E[])
@@ -88,7 +87,7 @@ static PetscErrorCode Keep(HycoFOM f, HycoMotions *motions, PetscReal stiffness[
     most = PetscMax(most, stiffness[k]);
     PetscCall(VecDuplicate(v[k], &s->v[s->n]));
     PetscCall(VecCopy(v[k], s->v[s->n]));
-    s->stiffness[s->n++] = stiffness[k] > EXACT * size ? -1 : stiffness[k];
+    s->stiffness[s->n++] = stiffness[k];
   }
   HycoDestroyAll(&diagonal, &work);
   PetscCall(VecDestroyVecs(motions->n, &v));

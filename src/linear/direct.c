@@ -462,7 +462,8 @@ static PetscErrorCode Run(HycoDirect d, int part)
 }
 
 /* q of the Schur variables from F and D, by forward substitution. Collective. */
-PetscErrorCode HycoDirectReduce(HycoDirect d, const Vec v[], PetscReal least, Vec F, const PetscReal D[], PetscReal q[])
+PetscErrorCode HycoDirectReduce(HycoDirect d, const Vec v[], const PetscReal stiffness[], PetscReal least, Vec F,
+                                const PetscReal D[], PetscReal q[])
 {
   PetscFunctionBegin;
   PetscCall(Fetch(d, F));
@@ -470,7 +471,7 @@ PetscErrorCode HycoDirectReduce(HycoDirect d, const Vec v[], PetscReal least, Ve
   PetscCall(Run(d, 1));
   for (PetscInt k = 0; k < d->n_schur && d->rank == 0; k++) q[k] = k < d->n_pinned ? -d->reduced[k] : d->reduced[k];
   HycoBcast(q, d->n_schur, MPIU_REAL, d->comm);
-  if (v) PetscCall(HycoMotionClean(d->n_pinned, v, d->pinned, F, least, q));
+  if (v) PetscCall(HycoMotionClean(d->n_pinned, v, stiffness, d->pinned, F, least, q));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -210,11 +210,12 @@ PetscErrorCode HycoMotionRows(Mat B, PetscInt p, const Vec z[], Vec work, PetscR
 }
 
 /* The elimination that finds w leaves more round-off than the sum of its terms, and a body that loads in equilibrium with
-   themselves do not move would be pushed by it. Only where w is small: elsewhere it keeps its digits. */
-PetscErrorCode HycoMotionClean(PetscInt n, const Vec v[], const PetscInt pinned[], Vec F, PetscReal least,
-                               PetscReal w[])
+   themselves do not move would be pushed by it. Only where w is small: elsewhere it keeps its digits. Springs on a motion
+   do work on the deformation of the body too, which the sum lacks. */
+PetscErrorCode HycoMotionClean(PetscInt n, const Vec v[], const PetscReal stiffness[], const PetscInt pinned[], Vec F,
+                               PetscReal least, PetscReal w[])
 {
-  PetscBool any = PETSC_FALSE;
+  PetscBool any = PETSC_FALSE, resisted;
   PetscBLASInt size, one = 1, info, *pivot;
   PetscReal *V, *c, all;
   Vec motion, work;
@@ -238,10 +239,14 @@ PetscErrorCode HycoMotionClean(PetscInt n, const Vec v[], const PetscInt pinned[
     c[i] = 1;
     LAPACKgetrs_("N", &size, &one, V, &size, pivot, c, &size, &info);
     PetscCall(VecZeroEntries(motion));
+    resisted = PETSC_FALSE;
     for (PetscInt k = 0; k < n; k++) {
       /* Those of other bodies have round-off here. */
-      if (PetscAbsReal(c[k]) > APART) PetscCall(VecAXPY(motion, c[k], v[k]));
+      if (!(PetscAbsReal(c[k]) > APART)) continue;
+      PetscCall(VecAXPY(motion, c[k], v[k]));
+      resisted = (PetscBool)(resisted || (stiffness && stiffness[k] != 0));
     }
+    if (resisted) continue;
     PetscCall(VecNorm(motion, NORM_INFINITY, &reach));
     PetscCall(VecPointwiseMult(work, motion, F));
     PetscCall(VecSum(work, &sum));

@@ -41,27 +41,48 @@ static PetscErrorCode FactorDense(HycoStiffness *f, Mat K, PetscBool *singular)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The block of the soft motions in S: in their coordinates the springs' stiffness, where that is known better than by
-   the Schur complement; exactly 0 for a floating body. */
+/* E of the soft motions v: the springs' stiffness less the work of their forces K v on the deformation under them, which
+   the pins allow. The Schur complement has it only to round-off of K. */
+static PetscErrorCode SpringBlock(const HycoSoft *soft, Mat K, HycoDirect direct, PetscReal E[])
+{
+  const PetscInt p = soft->n;
+  Vec force, *u;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(E, p * p));
+  PetscCall(VecDuplicate(soft->v[0], &force));
+  PetscCall(VecDuplicateVecs(force, p, &u));
+  for (PetscInt a = 0; a < p; a++) {
+    E[a * p + a] = soft->stiffness[a];
+    if (soft->stiffness[a] == 0) continue;
+    PetscCall(MatMult(K, soft->v[a], force));
+    PetscCall(HycoDirectSolve(direct, force, u[a]));
+    for (PetscInt b = 0; b <= a; b++) {
+      PetscReal work = 0;
+
+      if (soft->stiffness[b] != 0) PetscCall(VecDot(force, u[b], &work));
+      E[a * p + b] -= work;
+      if (b < a) E[b * p + a] -= work;
+    }
+  }
+  PetscCall(VecDestroyVecs(p, &u));
+  PetscCall(VecDestroy(&force));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The block of the soft motions in S, from that in their coordinates; exactly 0 for a floating body. */
 static PetscErrorCode SetSoftBlock(HycoSystem y, HycoDirect direct, PetscReal S[])
 {
   const HycoSoft *soft = y->soft;
   const PetscInt p = soft->n, n = p + y->m, *pinned = HycoDirectPinned(direct);
   const PetscBLASInt size = (PetscBLASInt)p;
-  const PetscReal one = 1, zero = 0;
   PetscReal *V, *E, *work;
   PetscBLASInt *ipiv, info;
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc4(p * p, &V, p * p, &E, p * p, &work, p, &ipiv));
   PetscCall(HycoMotionAtPins(p, soft->v, pinned, V));
-  for (PetscInt k = 0; k < p * p; k++) E[k] = S[(size_t)(k / p) * (size_t)n + (size_t)(k % p)];
-  /* V^T C V */
-  BLASgemm_("N", "N", &size, &size, &size, &one, E, &size, V, &size, &zero, work, &size);
-  BLASgemm_("T", "N", &size, &size, &size, &one, V, &size, work, &size, &zero, E, &size);
-  for (PetscInt k = 0; k < p * p; k++) {
-    if (soft->stiffness[k / p] >= 0 || soft->stiffness[k % p] >= 0) E[k] = k / p == k % p ? soft->stiffness[k / p] : 0;
-  }
+  PetscCall(SpringBlock(soft, y->K, direct, E));
   /* C = V^-T E V^-1, by columns: V^T X = E, then V^T C = X^T since C is symmetric. */
   LAPACKgetrf_(&size, &size, V, &size, ipiv, &info);
   for (int twice = 0; twice < 2 && !info; twice++) {

@@ -209,9 +209,10 @@ void HycoSystemSetSoft(HycoSystem s, const HycoSoft *soft)
   s->soft = soft && soft->n ? soft : NULL;
 }
 
-PetscErrorCode HycoSystemMotions(HycoSystem s, PetscInt *n, const Vec *v[])
+PetscErrorCode HycoSystemMotions(HycoSystem s, PetscInt *n, const Vec *v[], const PetscReal *stiffness[])
 {
   PetscFunctionBegin;
+  *stiffness = s->soft && s->blocks ? s->soft->stiffness : NULL;
   if (!s->soft || !s->blocks) {
     PetscCall(HycoKernelVectors(s->K, n, v));
     PetscFunctionReturn(PETSC_SUCCESS);

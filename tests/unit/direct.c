@@ -159,7 +159,7 @@ static PetscErrorCode CheckAll(HycoDirect direct, Mat K, Mat Bt, Mat B)
       CHECK_NEAR(S[j * M + i], RowTimes(i, column), 1e-11);
     }
   }
-  PetscCall(HycoDirectReduce(direct, NULL, 0, F, D, g));
+  PetscCall(HycoDirectReduce(direct, NULL, NULL, 0, F, D, g));
   Exact(NULL, x);
   for (PetscInt i = 0; i < M; i++) CHECK_NEAR(g[i], D[i] - RowTimes(i, x), 1e-11);
   PetscCall(HycoDirectExpand(direct, L, U));

@@ -497,7 +497,7 @@ static PetscErrorCode Respond(HycoSubstructures b, HycoBodiesFactor *factor, Pet
   PetscCall(ReduceBody(b, factor, k, b->r, factor->basis, in + k * b->r, u, work));
   /* The vectors have length 1, and round-off of it on bodies that they do not load. */
   for (PetscInt d = 0; d < b->r; d++)
-    PetscCall(HycoMotionClean(b->p, motion, factor->pins, factor->basis[d], HYCO_NOTHING, work + d * b->p));
+    PetscCall(HycoMotionClean(b->p, motion, NULL, factor->pins, factor->basis[d], HYCO_NOTHING, work + d * b->p));
   /* By unknown, as predictions read them: R c is then one product by rows. */
   for (PetscInt d = 0; d < b->r && !factor->fom->rank; d++) {
     for (PetscInt i = 0; i < n; i++) record->R[i * b->r + d] = u[d * b->ns + b->start[k] + i];

@@ -102,14 +102,15 @@ static PetscErrorCode FreeGap(HycoSolver s, const Dual *d, Vec x)
   HycoSystem y = s->system;
   PetscInt p;
   const Vec *motion;
+  const PetscReal *stiffness;
 
   PetscFunctionBegin;
   /* MUMPS reduces F and D to the Schur variables in one forward substitution; with s->free the displacements without
      forces are known. */
   if (!s->stiffness.lu && !s->free) {
     PetscCall(HycoVecGather(y->D, d->L));
-    PetscCall(HycoSystemMotions(y, &p, &motion));
-    PetscCall(HycoDirectReduce(s->stiffness.direct, motion, y->rounding, y->F, d->L, d->g));
+    PetscCall(HycoSystemMotions(y, &p, &motion, &stiffness));
+    PetscCall(HycoDirectReduce(s->stiffness.direct, motion, stiffness, y->rounding, y->F, d->L, d->g));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (s->free)

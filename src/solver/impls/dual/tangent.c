@@ -140,7 +140,7 @@ PetscErrorCode HycoSolverTangentSolve(HycoSolverTangent t, Vec r, Vec g, int sig
   }
   PetscCheck(direct, HycoComm(t->s), PETSC_ERR_SUP, "the derivative of a solution is for a sparse K");
   PetscCall(HycoVecGather(g, t->z));
-  PetscCall(HycoDirectReduce(direct, NULL, 0, r, t->z, t->q));
+  PetscCall(HycoDirectReduce(direct, NULL, NULL, 0, r, t->z, t->q));
   PetscCall(HycoTangentSolve(t->tangent, t->q, sign, t->z, kink));
   PetscCall(HycoDirectExpand(direct, t->z, dx));
   PetscCall(VecGetOwnershipRange(dL, &lo, &hi));
@@ -152,7 +152,7 @@ PetscErrorCode HycoSolverTangentSolveCones(HycoSolverTangent t, Vec r, Vec g, Ve
                                            Vec dw, PetscBool *regular)
 {
   HycoDirect direct = t->s->stiffness.direct;
-  const PetscReal *z;
+  const PetscReal *z, *stiffness;
   const Vec *motion;
   PetscReal least = t->s->system->rounding, size;
   HycoLCP lcp;
@@ -163,12 +163,12 @@ PetscErrorCode HycoSolverTangentSolveCones(HycoSolverTangent t, Vec r, Vec g, Ve
   HycoSolverGetDense(t->s, &lcp, &z);
   lcp.blocks = t->blocks;
   lcp.springs = (PetscBool)(t->s->system->soft != NULL);
-  PetscCall(HycoSystemMotions(t->s->system, &p, &motion));
+  PetscCall(HycoSystemMotions(t->s->system, &p, &motion, &stiffness));
   PetscCall(HycoVecGather(g, t->z));
   /* Also where all forces have vanished. */
   for (PetscInt i = 0; i < t->m; i++) least = PetscMax(least, PETSC_MACHINE_EPSILON * PetscAbsReal(t->before[i]));
   least *= 2 / PetscAbsReal(step);
-  PetscCall(HycoDirectReduce(direct, motion, least, r, t->z, t->q));
+  PetscCall(HycoDirectReduce(direct, motion, stiffness, least, r, t->z, t->q));
   PetscCall(VecNorm(r, NORM_INFINITY, &size));
   for (PetscInt i = 0; i < t->p && size <= least; i++) t->q[i] = 0;
   PetscCall(HycoVecGather(mu, t->dmu));
