@@ -100,9 +100,7 @@ typedef struct {
   /* of each output of the scene the largest (for `min` the smallest) over the listed times that were reached */
   PetscReal path_quantity[HYCO_MAX_QUANTITIES];
   PetscInt n_bound; /* number of steps that only -hyco_step_inelastic kept from growing; since a resumption */
-  PetscReal
-      rate_change; /* change of the largest rate of inelastic strain within a step over the rate, mean over the strain:
-                            a sign of errors in time; 0 where a law yields at once, and of reduced models; since a resumption */
+  PetscReal time_error; /* sum of the steps' estimated errors of creep strains, relative to the largest inelastic strain */
 } HycoHistory;
 
 /* The derivatives of the scene's outputs with respect to its parameters, in the unit of the output over that of the

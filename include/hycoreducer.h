@@ -154,7 +154,7 @@ typedef struct {
   PetscReal seconds_snapshots, seconds_reduction;
   PetscReal seconds_solution; /* a full-order solution with what is kept from others, mean; 0: none was solved now */
   PetscReal sliding;          /* the largest of all solutions, as in HycoSummary */
-  PetscReal rate_change;      /* the largest of the paths that were solved now, as in HycoHistory */
+  PetscReal time_error;       /* the largest of the paths that were solved now, as in HycoHistory */
 } HycoTraining;
 
 /* Gets solved[n_groups]: how many points each group of ranks has solved full order in the last run; those found in the

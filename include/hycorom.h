@@ -90,6 +90,8 @@ typedef struct {
                            the work of friction then have no estimate */
   char why
       [512]; /* bodies: which motion of a body the loads have work on, of a reason below 0; "": HycoReasonName() says all */
+  char free_motion
+      [512]; /* where `loose` is set: its body, as far as known its direction, on a path the times; as in HycoSummary */
 } HycoPrediction;
 
 /* Result of the scan for a singular reduced stiffness in the parameters' ranges. */

@@ -966,9 +966,10 @@ static PetscErrorCode KeepTerms(Export *e, const PetscInt place[], const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The tables of a history. */
-static PetscErrorCode TakeTables(const HycoScene s, Model *o)
+/* The tables of a history, and the times at which steps of predictions end. */
+static PetscErrorCode TakeTables(const HycoROM m, const HycoScene s, Model *o)
 {
+  const HycoPath path = s->n_times ? ((HycoBodiesPath)m->work)->path : NULL;
   PetscInt n = 0;
 
   PetscFunctionBegin;
@@ -982,6 +983,9 @@ static PetscErrorCode TakeTables(const HycoScene s, Model *o)
     }
     o->table[k + 1] = (int)n;
   }
+  if (!path || path->substeps || !(path->time_tol > 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  o->n_stops = (int)m->model->n_stops;
+  HycoDuplicate(m->model->n_stops, m->model->stops, &o->stop);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -1016,7 +1020,7 @@ static PetscErrorCode Fill(Export *e)
   }
   o->m.n_parameters = (int)e->s->n_parameters;
   o->m.code = o->code.text;
-  PetscCall(TakeTables(e->s, &o->m));
+  PetscCall(TakeTables(e->m, e->s, &o->m));
   o->m.n_motions = e->p;
   o->m.n_places = e->k;
   o->m.n_contacts = e->travel ? e->m->model->pairs.n : e->k;

@@ -160,6 +160,7 @@ static int List(HycoExportModel *e, HycoScene s, Array list[MOST_ARRAYS])
       {"int", "table", tables ? tables + 1 : 0, 0, OWN(m->table)},
       {"double", "table_t", rows, 0, OWN(m->table_t)},
       {"double", "table_value", rows, 0, OWN(m->table_value)},
+      {"double", "stop", (size_t)m->n_stops, 0, OWN(m->stop)},
       {"Flowing", "flowing", flowing, 4, OWN(m->flowing)},
       {"int", "constant", flowing * SLOTS, 0, OWN(m->constant)},
       {"double", "point", 3 * (size_t)m->n_points, 0, OWN(m->point)},
@@ -262,15 +263,13 @@ static PetscErrorCode WriteProgram(HycoExportModel *e, HycoScene s, const char p
   const struct {
     const char *name;
     int value;
-  } size[] = {SIZE(n_parameters),     SIZE(n_atoms),      SIZE(n_functions),
-              SIZE(n_motions),        SIZE(n_places),     SIZE(n_stiffness),
-              SIZE(n_values),         SIZE(n_terms),      SIZE(n_outputs),
-              SIZE(n_contacts),       SIZE(n_blocks),     SIZE(areas),
-              SIZE(n_slip),           SIZE(n_tables),     SIZE(n_modes),
-              SIZE(n_points),         SIZE(n_settled),    SIZE(n_chosen),
-              SIZE(n_strain),         SIZE(n_flowing),    SIZE(n_lost),
-              SIZE(newton_most),      SIZE(surfaces.dim), SIZE(surfaces.n_nodes),
-              SIZE(surfaces.nf),      SIZE(surfaces.nq),  SIZE(surfaces.n_searches),
+  } size[] = {SIZE(n_parameters),     SIZE(n_atoms),     SIZE(n_functions), SIZE(n_motions),
+              SIZE(n_places),         SIZE(n_stiffness), SIZE(n_values),    SIZE(n_terms),
+              SIZE(n_outputs),        SIZE(n_contacts),  SIZE(n_blocks),    SIZE(areas),
+              SIZE(n_slip),           SIZE(n_stops),     SIZE(n_tables),    SIZE(n_modes),
+              SIZE(n_points),         SIZE(n_settled),   SIZE(n_chosen),    SIZE(n_strain),
+              SIZE(n_flowing),        SIZE(n_lost),      SIZE(newton_most), SIZE(surfaces.dim),
+              SIZE(surfaces.n_nodes), SIZE(surfaces.nf), SIZE(surfaces.nq), SIZE(surfaces.n_searches),
               SIZE(surfaces.n_facets)};
 
   PetscFunctionBegin;

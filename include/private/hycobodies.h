@@ -347,8 +347,9 @@ PetscErrorCode HycoBodiesFrictionDerive(HycoBodiesFriction friction, PetscInt m,
    has further solutions. */
 void HycoBodiesFrictionNormal(HycoBodiesFriction friction, PetscReal Lambda[]);
 const HycoSlip *HycoBodiesFrictionSlip(HycoBodiesFriction friction);
-/* Whether a state accepted since the begin left a rigid motion free, or the last one has loads but no forces. */
-PetscBool HycoBodiesFrictionLoose(HycoBodiesFriction friction);
+/* Whether a state accepted since the begin left a rigid motion free, which is then named unless name is NULL, or the last one
+   has loads but no forces. */
+PetscBool HycoBodiesFrictionLoose(HycoBodiesFriction friction, char name[HYCO_LINE]);
 PetscErrorCode HycoBodiesFrictionDisproven(HycoBodiesFriction friction, PetscBool *disproven);
 /* Parts of a solve for gradients. HycoBodiesBring(): the data of the bodies, c and the rows at mu, as HycoBodiesPrepare();
    o->gap: those of the rows (surface NULL: these stay). HycoBodiesBlend(): sum[n] of the samples' numbers by their weights. HycoBodiesYield(): u -= C f /

@@ -148,6 +148,10 @@ PetscErrorCode HycoBlocksLeaveSlide(const HycoBlocks *blocks, PetscInt p, const 
                                     PetscReal r[]);
 /* Whether the law of a block, Coulomb's, has friction: its coefficient is above 0. */
 PetscBool HycoBlockRubs(const HycoBlocks *blocks, PetscInt k);
+/* Of p motions with the rows A (p x rows by columns), those which neither the normal forces of r nor its tangential ones
+   that stick hold: their number, 0 without any force, and the first of them (p). */
+PetscErrorCode HycoBlocksLoose(const HycoBlocks *blocks, PetscInt p, const PetscReal A[], const PetscReal r[],
+                               PetscInt *n, PetscReal first[]);
 /*
   Coulomb's law: x[p], the change of the p motions after a step with the slacks w and the forces r (by row) along the n
   motions that no force acts on, by which the contacts slip least in the step and no gap becomes negative; move[p]: the

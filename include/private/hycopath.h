@@ -56,6 +56,9 @@ typedef struct {
   /* Replaces Newton's method on K, B and the solver: from U and Lambda at t0, with everything assembled at t1, to those
      at t1, `end` and kkt. */
   PetscErrorCode (*iterate)(HycoPath, PetscReal t0, PetscReal t1, HycoStepAttempt *);
+  /* The rates of HycoFERates() in the state at t, `begin` or that of the attempt (`end`): all collective, largest over all
+     ranks. NULL: steps are not chosen by their error. */
+  PetscErrorCode (*rates)(HycoPath, PetscReal t, PetscReal dt, HycoFEState state, PetscReal rate[], PetscReal *largest);
   PetscErrorCode (*accept)(HycoPath, const HycoStepAttempt *); /* the attempt becomes the state at t */
   PetscErrorCode (*record)(HycoPath); /* at a listed time, or at the last time reached: sets `now` */
   PetscErrorCode (*save)(HycoPath);   /* writes the checkpoint */
@@ -76,9 +79,9 @@ struct _n_HycoPath {
   PetscInt n_free;       /* number of unknowns */
   PetscBool cold;        /* the next contact system is solved without data from the last one */
   /* options */
-  PetscInt method; /* a HycoNewton */
-  PetscInt max_its, substeps;
-  PetscReal rtol, bound, smallest;
+  PetscInt method;            /* a HycoNewton */
+  PetscInt max_its, substeps; /* substeps: 0: by the error in time */
+  PetscReal rtol, bound, smallest, time_tol;
   char checkpoint[PETSC_MAX_PATH_LEN];
   PetscBool resume;
   char fclib[PETSC_MAX_PATH_LEN]; /* friction: a file for the problem of the step to this time; fclib_timed: given */
@@ -87,6 +90,10 @@ struct _n_HycoPath {
   /* prescribed times of the steps; NULL: chosen by the path. Borrowed */
   PetscInt n_given;
   const PetscReal *given;
+  /* times at which steps end as well, which the path may shorten; unless it has steps of its own (-hyco_substeps, or
+     -hyco_step_error 0). Borrowed */
+  PetscInt n_stops;
+  const PetscReal *stops;
   PetscInt most_cuts, n_cuts; /* limit on the steps of the path that may be halved before it ends; 0: none; and their
                                  number */
   /* state of the laws at the last accepted time, and of the attempt */
@@ -99,19 +106,24 @@ struct _n_HycoPath {
   PetscInt kept;           /* number of contact systems solved with this K */
   PetscBool flows;         /* some body's law is inelastic */
   PetscBool rubs;          /* friction: the contact forces have no potential */
-  char loose[HYCO_LINE]; /* full order: a motion that no contact force acted on where the coefficient was 0; "": none */
-  char slides[HYCO_LINE]; /* how a body slides away in a larger step, which halving cannot mend; "": none does */
+  char loose[HYCO_LINE];   /* full order with friction: the first motion that no contact force held; "": none */
+  PetscReal loose_at[2];   /* the first and the last time of one */
+  char slides[HYCO_LINE];  /* how a body slides away in a larger step, which halving cannot mend; "": none does */
   /* Anderson's acceleration: differences of iterates and residuals, newest last */
   PetscInt n_mixed;
   Vec dU[HYCO_ANDERSON], dG[HYCO_ANDERSON], U_last, G_last, G;
   Vec dL[HYCO_ANDERSON], L_last, L_new;
   /* current position on the path */
   PetscReal mu[HYCO_MAX_PARAMETERS], t, dt;
-  PetscReal rate, crept, changed; /* of the largest inelastic strain; its sum; of changes of the rate times the steps */
-  PetscBool creeps;               /* full order: no law deforms inelastically at once, which has no rate */
-  PetscInt step;                  /* number of listed times reached: the index of the next one */
-  HycoKKT kkt;                    /* of the last accepted time */
-  HycoStep now;                   /* since the last listed time */
+  PetscReal *rate[2];     /* by point: at t, and of the attempt; NULL: ops->rates is */
+  PetscBool rates, rated; /* steps have an estimate of their error in time; rate[0] is known */
+  PetscReal rated_by;     /* the length of the step that gave rate[0] */
+  PetscReal time_error, largest,
+      ahead;     /* sum of the steps' estimates; inelastic strain at t, and of any attempt since the
+                                           last listed time */
+  PetscInt step; /* number of listed times reached: the index of the next one */
+  HycoKKT kkt;   /* of the last accepted time */
+  HycoStep now;  /* since the last listed time */
   PetscInt
       n_bound; /* number of accepted steps that only -hyco_step_inelastic kept from growing, without those before a resumption */
   PetscInt n_steps;
@@ -171,6 +183,8 @@ HycoNewton HycoPathMethod(HycoPath path);
 PetscBool HycoPathIsBeyond(const HycoQuantity *quantity, PetscReal a, PetscReal b);
 /* value[n_quantities]: the largest of each quantity over n >= 1 listed times; for `min` the smallest. */
 void HycoPathExtremes(HycoScene scene, PetscInt n, const HycoStep step[], PetscReal value[]);
+/* "body NAME from moving along ..." with the first and the last time at which it is so. */
+void HycoPathNameTimes(const char name[], const PetscReal at[2], char text[HYCO_LINE]);
 /* Fills the history with the path's results. */
 void HycoPathGetHistory(HycoPath path, HycoHistory *history);
 

@@ -131,12 +131,14 @@ struct _p_HycoReducer {
                             of each sample */
   PetscInt *taken_start;  /* rank 0, with a history: n_samples + 1, where the times of each path's steps begin in */
   PetscReal *taken;
+  PetscInt n_stops; /* those of predictions, and the largest of their errors in time: HycoModel */
+  PetscReal *stops, stops_error;
   HycoJudged *judged; /* rank 0, by sample: results of HycoReducerJudge(); NULL: not called */
   unsigned long long fingerprint;
   PetscInt n_solvers, *solved; /* of the last run, every rank: number of groups of ranks, and of solutions of each */
   PetscReal seconds_solution;  /* HycoTraining */
   PetscReal sliding;           /* of the last run's solutions, */
-  PetscReal rate_change;       /* of those that were solved now */
+  PetscReal time_error;       /* of those that were solved now */
   PetscInt unsolved;           /* of the last run, every rank: HycoSnapshotsGetBalance() */
   PetscReal *written;
   PetscReal solving;     /* seconds of its full-order solutions */

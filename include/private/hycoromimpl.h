@@ -93,6 +93,8 @@ struct _n_HycoModel {
   HycoFloating floating;  /* the bodies that contact alone holds (floating.c); NULL: there are none, or an older file */
   PetscInt n_points;
   PetscReal *points; /* training points, n_points x n_parameters */
+  PetscInt n_stops;  /* of a history: times between the listed ones at which steps of predictions end as well, */
+  PetscReal *stops, time_error; /* and the largest estimate of full order's error in time: HycoHistory */
   PetscReal *reach;  /* least, then largest parameter values of the region of training (error_estimate.c); created
                         when needed */
   char *provenance;
@@ -146,7 +148,7 @@ struct _p_HycoROM {
   HycoFE fe_beyond;             /* on mesh without its cells */
   HycoFE fe_whole;              /* on whole */
   HycoPairs whole_pairs;        /* as `pairs`, on whole */
-  char loose[HYCO_LINE];        /* where prediction.loose is set: "body NAME in its place" */
+  char loose[HYCO_LINE];        /* where prediction.loose is set: "body NAME in its place", or "body NAME from moving along ..." */
   HycoFE fe_floating;           /* on the loaded cells of the bodies that contact alone holds */
   HycoRigid *rigid;             /* their motions at the last prediction, if parameters change them */
   HycoOutputCells output_cells; /* of the scene's quantities */

@@ -21,7 +21,7 @@ struct _p_HycoSnapshots {
   PetscInt timed[2];     /* their numbers */
   PetscReal seconds;     /* of a solution, the mean of all ranks */
   PetscReal sliding;     /* the largest of all points that were filled: HycoSummary */
-  PetscReal rate_change; /* the same of the paths that were solved: HycoHistory */
+  PetscReal time_error; /* the same of the paths that were solved: HycoHistory */
   HycoH5 last;           /* the file that was read last, checked and open; or NULL */
   char last_path[PETSC_MAX_PATH_LEN]; /* its name */
   PetscInt n_pieces;                  /* finished pieces of this training that have files, by their keys; rank 0 */
@@ -89,6 +89,7 @@ PetscErrorCode HycoSnapshotsReadRows(HycoSnapshots store, const PetscReal mu[], 
 PetscErrorCode HycoSnapshotsHas(HycoSnapshots store, const PetscReal mu[], PetscInt k, const char field[],
                                 PetscBool *has);
 /* The times of the steps of the path at mu (the caller frees them). Not collective. */
-PetscErrorCode HycoSnapshotsReadTaken(HycoSnapshots store, const PetscReal mu[], PetscInt *n, PetscReal **taken);
+PetscErrorCode HycoSnapshotsReadTaken(HycoSnapshots store, const PetscReal mu[], PetscInt *n, PetscReal **taken,
+                                      PetscReal *time_error);
 
 #endif

@@ -54,7 +54,8 @@ static void FillCommon(const DriverColumns *c, const HycoSummary *s, const HycoP
 /* One point on one group: both solutions, and their difference. Both on this group's ranks. A failed full-order
    solution ends the command: there is nothing to compare with. */
 static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, PetscInt n_par, const PetscReal mu[],
-                                   const Outputs *outputs, const DriverColumns *c, PetscReal v[], PetscReal *sliding)
+                                   const Outputs *outputs, const DriverColumns *c, PetscReal v[], PetscReal *sliding,
+                                   char free_motion[DRIVER_LINE])
 {
   HycoSummary s;
   HycoPrediction p;
@@ -77,9 +78,9 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   seconds[1] = HycoNow() - begin;
   PetscCall(HycoROMCompare(model, fom, &e));
   /* Of an arbitrary position there is no error: full order has chosen another one. */
-  v[DRIVER_U] = p.loose ? 0 : e.u;
-  v[DRIVER_U_H1] = p.loose ? 0 : e.u_h1;
-  v[DRIVER_U_RID] = p.loose ? 0 : e.u_rid;
+  v[DRIVER_U] = p.loose ? NAN : e.u;
+  v[DRIVER_U_H1] = p.loose ? NAN : e.u_h1;
+  v[DRIVER_U_RID] = p.loose ? NAN : e.u_rid;
   v[DRIVER_SIGMA] = e.sigma;
   v[DRIVER_SIGMA_11] = e.sigma_11;
   v[DRIVER_LAMBDA_RID] = e.lambda_rid;
@@ -87,6 +88,7 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   v[DRIVER_LAMBDA] = e.lambda;
   v[DRIVER_LAMBDA_DUAL] = e.lambda_dual;
   FillCommon(c, &s, &p, v, sliding);
+  PetscCall(PetscStrncpy(free_motion, p.free_motion, DRIVER_LINE));
   v[c->n_errors + DRIVER_SECONDS_FOM] = seconds[0];
   v[c->n_errors + DRIVER_SECONDS_ROM] = seconds[1];
   /* The fallback solver of the contact problem, not full order. */
@@ -99,7 +101,7 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   for (PetscInt q = 0; q < outputs->n && p.reason > 0; q++) {
     const PetscReal error = PetscAbsReal(p.quantity[outputs->reduced[q]] - s.quantity[outputs->full[q]]);
 
-    v[c->outputs + q] = p.loose && outputs->placed[q] ? 0 : error;
+    v[c->outputs + q] = p.loose && outputs->placed[q] ? NAN : error;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -118,7 +120,7 @@ static PetscErrorCode CompareOutputs(HycoFOM fom, HycoROM model, PetscBool loose
   for (PetscInt q = 0; q < outputs->n; q++) {
     PetscReal *worst = &v[q], *end = &v[outputs->n + q];
 
-    *worst = *end = both ? 0 : PETSC_INFINITY;
+    *worst = *end = loose && outputs->placed[q] ? NAN : both ? 0 : PETSC_INFINITY;
     for (PetscInt k = 0; k < both && !(loose && outputs->placed[q]); k++) {
       *end = PetscAbsReal(full.step[k].quantity[outputs->full[q]] - reduced.step[k].quantity[outputs->reduced[q]]);
       /* The form keeps NaN, which a maximum would drop. */
@@ -130,7 +132,8 @@ static PetscErrorCode CompareOutputs(HycoFOM fom, HycoROM model, PetscBool loose
 
 /* The full-order path and the model's, and their difference; root: the rank that predicts and whose v is used. */
 static PetscErrorCode ComparePath(HycoFOM fom, HycoROM model, PetscBool root, PetscInt n_par, const PetscReal mu[],
-                                  const Outputs *outputs, const DriverColumns *c, PetscReal v[], PetscReal *sliding)
+                                  const Outputs *outputs, const DriverColumns *c, PetscReal v[], PetscReal *sliding,
+                                  char free_motion[DRIVER_LINE])
 {
   HycoSummary s;
   HycoPrediction p = {0};
@@ -144,8 +147,11 @@ static PetscErrorCode ComparePath(HycoFOM fom, HycoROM model, PetscBool root, Pe
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
     v[j] = e.worst[j];
     v[HYCO_N_ERRORS + j] = e.end[j];
+    /* Compared at no time with loads. */
+    if (p.loose && (j == HYCO_ERROR_U || j == HYCO_ERROR_U_RID) && e.worst[j] == 0) v[j] = v[HYCO_N_ERRORS + j] = NAN;
   }
   FillCommon(c, &s, &p, v, sliding);
+  PetscCall(PetscStrncpy(free_motion, p.free_motion, DRIVER_LINE));
   v[c->n_errors + DRIVER_REACHED] = e.n;
   v[c->n_errors + DRIVER_ITERATIONS] = p.iterations;
   if (root && outputs->n) PetscCall(CompareOutputs(fom, model, p.loose, outputs, v + c->outputs));
@@ -162,6 +168,8 @@ typedef struct {
   PetscReal *value, *sliding; /* the largest of this rank's points */
   Outputs outputs;
   DriverColumns columns;
+  PetscInt *loose; /* this rank's first point at which the position of a body is arbitrary, and its motion; n: none */
+  char *free_motion;
 } Points;
 
 /* Every rank of a group takes the same point from the queue; rows are kept by its first rank, and `unused` takes
@@ -173,6 +181,7 @@ static PetscErrorCode CompareQueued(const Points *p, HycoFOM fom, PetscBool root
 
   PetscFunctionBegin;
   for (PetscBool first = PETSC_TRUE;; first = PETSC_FALSE) {
+    char free_motion[DRIVER_LINE] = "";
     PetscReal *v;
 
     PetscCall(HycoQueueTake(p->queue, &k));
@@ -185,9 +194,12 @@ static PetscErrorCode CompareQueued(const Points *p, HycoFOM fom, PetscBool root
     /* Rows of other groups stay 0 on this rank, so that a sum over the ranks collects the table. */
     v = root ? p->value + k * p->columns.n : unused;
     PetscCall(p->columns.paths ? ComparePath(fom, p->model, root, p->n_par, p->mu + k * p->n_par, &p->outputs,
-                                             &p->columns, v, p->sliding)
+                                             &p->columns, v, p->sliding, free_motion)
                                : ComparePoint(p->scene, fom, p->model, p->n_par, p->mu + k * p->n_par, &p->outputs,
-                                              &p->columns, v, p->sliding));
+                                              &p->columns, v, p->sliding, free_motion));
+    if (!root || !free_motion[0] || k >= *p->loose) continue;
+    *p->loose = k;
+    PetscCall(PetscStrncpy(p->free_motion, free_motion, DRIVER_LINE));
   }
 }
 
@@ -254,6 +266,23 @@ PetscErrorCode DeclareCompare(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The motion of the first point of all ranks. */
+static PetscErrorCode PrintLoose(const Points *p)
+{
+  PetscInt first = *p->loose;
+  PetscMPIInt rank = HycoRank(PETSC_COMM_WORLD);
+
+  PetscFunctionBegin;
+  HycoAllreduce(&first, 1, MPIU_INT, MPI_MIN, PETSC_COMM_WORLD);
+  if (first == p->n) PetscFunctionReturn(PETSC_SUCCESS);
+  if (*p->loose != first) rank = HycoSize(PETSC_COMM_WORLD);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &rank, 1, MPI_INT, MPI_MIN, PETSC_COMM_WORLD));
+  PetscCallMPI(MPI_Bcast(p->free_motion, DRIVER_LINE, MPI_CHAR, rank, PETSC_COMM_WORLD));
+  PetscCall(DriverPrint("warning: no contact force keeps %s at point %d: its position is arbitrary\n", p->free_motion,
+                        (int)first + 1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The scene and the model must belong together, which is checked before any solve. */
 PetscErrorCode CommandCompare(void)
 {
@@ -265,7 +294,8 @@ PetscErrorCode CommandCompare(void)
   DriverRows rows;
   PetscBool given, contact, extrapolate;
   PetscReal sliding = 0;
-  PetscInt n_times;
+  PetscInt n_times, loose;
+  char free_motion[DRIVER_LINE] = "";
   char path[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
@@ -293,6 +323,9 @@ PetscErrorCode CommandCompare(void)
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
   PetscCall(DriverCompareColumns((PetscBool)(n_times > 0), p.outputs.n, p.outputs.names, &p.columns));
   p.sliding = &sliding;
+  p.loose = &loose;
+  p.free_motion = free_motion;
+  loose = p.n;
   /* Afterwards rank 0 has all rows. */
   PetscCall(CompareAll(&p));
   HycoAllreduce(&sliding, 1, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD);
@@ -300,6 +333,7 @@ PetscErrorCode CommandCompare(void)
   /* Before the report, which fails if a prediction did not converge. */
   if (table[0]) PetscCall(DriverWriteTable(table, scene, p.mu, p.columns.names, &rows));
   PetscCall(DriverWarnSliding(sliding));
+  PetscCall(PrintLoose(&p));
   PetscCall(DriverReportComparison(scene, contact, &p.columns, p.n, p.value));
   PetscCall(PetscFree(p.value));
   PetscCall(HycoSamplesDestroy(&samples));

@@ -70,7 +70,8 @@ static PetscErrorCode PrintEstimates(HycoScene scene, const HycoPrediction *p, c
   PetscFunctionBegin;
   PetscCall(DriverPrintDependent(p->n_dependent, path ? path->n : 0, path ? path->step : NULL));
   if (p->loose)
-    PetscCall(DriverPrint("warning: the contact forces leave a motion of a body free: its position is arbitrary\n"));
+    PetscCall(DriverPrint("warning: no contact force keeps %s: its position is arbitrary\n",
+                          p->free_motion[0] ? p->free_motion : "a body in its place"));
   for (PetscInt k = 0; k < 3; k++) {
     if (estimate[k] >= 0)
       DriverPercent(estimate[k], words[k]);
@@ -127,6 +128,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   cJSON_AddBoolToObject(json, "converged", p->reason > 0);
   if (p->n_dependent >= 0) cJSON_AddBoolToObject(json, "forces_unique", p->n_dependent == 0);
   cJSON_AddBoolToObject(json, "position_arbitrary", p->loose);
+  cJSON_AddStringToObject(json, "loose", p->free_motion);
   ReportNumbers(json, {"n_modes", p->n_modes}, {"n_fe_dofs", p->n_fe_dofs});
   /* Full order has no RID: a report of one would be that of the prediction it replaces. */
   if (!fallback[0]) ReportRID(json, p);

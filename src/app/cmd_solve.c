@@ -84,6 +84,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   cJSON_AddBoolToObject(json, "forces_unique", s->n_dependent == 0);
   cJSON_AddNumberToObject(json, "n_dependent", s->n_dependent);
   cJSON_AddStringToObject(json, "regularised", s->regularised);
+  cJSON_AddBoolToObject(json, "position_arbitrary", s->loose[0] != '\0');
   cJSON_AddStringToObject(json, "loose", s->loose);
   cJSON_AddStringToObject(json, "buried", s->buried);
   cJSON_AddNumberToObject(json, "active_set_iterations", s->iterations);

@@ -289,7 +289,7 @@ PetscErrorCode CommandTrain(void)
                           (int)t.scan.n, (double)t.scan.smallest,
                           t.scan.n_singular ? "; SINGULAR inside, kept by -hyco_keep_singular" : ""));
   PetscCall(DriverWarnSliding(t.sliding));
-  PetscCall(DriverWarnSteps(t.rate_change));
+  PetscCall(DriverWarnSteps(t.time_error));
   PetscCall(DriverJudgeModel(&search, &t));
   PetscCall(PrintGain(scene, model, &t));
   PetscCall(DriverPrint("seconds: %.2f snapshots, %.2f reduction; model in %s\n", (double)t.seconds_snapshots,

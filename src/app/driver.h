@@ -123,7 +123,7 @@ PetscErrorCode DriverReportOptionFiles(cJSON *json);
 PetscErrorCode ReportCreate(const char command[], HycoScene scene, const PetscReal mu[], cJSON **json);
 /* A line if sliding, the largest of all solutions, is above 1. */
 PetscErrorCode DriverWarnSliding(PetscReal sliding);
-PetscErrorCode DriverWarnSteps(PetscReal rate_change);
+PetscErrorCode DriverWarnSteps(PetscReal time_error);
 /* Adds to the report, and prints where relevant: the largest initial overlap, the sliding, and whether no contact
    faces a master. */
 PetscErrorCode ReportContacts(cJSON *json, PetscInt n_contacts, PetscInt n_facing, PetscReal overlap,
@@ -382,7 +382,7 @@ typedef struct {
   PetscInt n;
   HycoStep *step; /* PetscFree() it */
   PetscBool ended;
-  PetscReal t;
+  PetscReal t, time_error;
   char why[DRIVER_LINE];
   PetscBool balanced;          /* -hyco_residual */
   HycoEquilibrium equilibrium; /* its result, on rank 0; borrowed from the model */

@@ -12,6 +12,7 @@ PetscErrorCode DriverGetReducedPath(HycoROM model, DriverReducedPath *path)
   path->ended = h.ended;
   path->t = h.t;
   path->n = h.n;
+  path->time_error = h.time_error;
   if (HycoRank(PETSC_COMM_WORLD) == 0) PetscCall(PetscStrncpy(path->why, h.why, sizeof(path->why)));
   PetscCallMPI(MPI_Bcast(path, sizeof(*path), MPI_BYTE, 0, PETSC_COMM_WORLD));
   PetscCall(PetscMalloc1(path->n, &path->step));
@@ -31,6 +32,7 @@ PetscErrorCode DriverPrintReducedPath(HycoScene scene, const PetscReal mu[], con
   PetscFunctionBegin;
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
   for (PetscInt k = 0; k < path->n; k++) PetscCall(DriverPrintStep(&path->step[k], n_times));
+  PetscCall(DriverWarnSteps(path->time_error));
   PetscCall(DriverWriteSteps(table, scene, mu, PETSC_TRUE, path->n, path->step));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -81,6 +83,7 @@ PetscErrorCode DriverReportReducedPath(cJSON *json, HycoScene scene, const Drive
   PetscFunctionBegin;
   cJSON_AddBoolToObject(history, "ended", path->ended);
   cJSON_AddNumberToObject(history, "t_end", path->t);
+  cJSON_AddNumberToObject(history, "time_error", path->time_error);
   PetscCall(DriverReportSteps(history, scene, PETSC_TRUE, path->n, path->step));
   if (path->balanced) ReportEquilibrium(json, path);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -55,7 +55,9 @@ static void DescribeErrors(PetscBool path, const PetscReal error[], char text[DR
 
     DriverPercent(error[kinds[j]], percent);
     at += (size_t)snprintf(text + at, DRIVER_LINE - at, "%s%s %s", j ? ", " : "", words[j],
-                           error[kinds[j]] > PETSC_MAX_REAL / 8 ? "infinite" : percent);
+                           error[kinds[j]] > PETSC_MAX_REAL / 8 ? "infinite"
+                           : PetscIsNanReal(error[kinds[j]])    ? "not compared"
+                                                                : percent);
   }
 }
 
@@ -266,7 +268,7 @@ static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
     char reached[32], asked[32];
 
     /* No limit for this kind. */
-    if (!(limit[j] > 0) || t->held_out.largest[j] <= limit[j]) continue;
+    if (!(limit[j] > 0) || !(t->held_out.largest[j] > limit[j])) continue;
     DriverPercent(t->held_out.largest[j], reached);
     DriverPercent(limit[j], asked);
     PetscCall(DriverMissed(
@@ -319,6 +321,9 @@ static PetscErrorCode PrintOutputs(const Search *s, const HycoTraining *t)
     if (o->magnitude < 0)
       PetscCall(DriverPrint("output %s: its error is not known%s, and not estimated\n", names[q],
                             IsPath(s) ? " (snapshots from before a reaction was named do not have it)" : ""));
+    else if (o->median < 0)
+      PetscCall(DriverPrint("output %s: not compared, and not estimated, as the position of a body is arbitrary\n",
+                            names[q]));
     else
       PetscCall(DriverPrint("output %s: errors median %.3g, largest %.3g; values up to %.4g%s%s%s\n", names[q],
                             (double)o->median, (double)o->largest, (double)o->magnitude, units[q][0] ? " " : "",
@@ -366,10 +371,10 @@ PetscErrorCode DriverJudgeModel(const Search *s, const HycoTraining *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A number, or null where it is infinite. */
+/* A number, or null where it is infinite, or not known. */
 static void AddFinite(cJSON *object, const char name[], PetscReal value)
 {
-  if (value > PETSC_MAX_REAL / 8)
+  if (!(value <= PETSC_MAX_REAL / 8))
     cJSON_AddNullToObject(object, name);
   else
     cJSON_AddNumberToObject(object, name, value);
@@ -389,8 +394,8 @@ static void ReportOutputs(cJSON *held, const Search *s, const HycoTraining *t)
     const PetscReal infinite = PETSC_MAX_REAL;
     cJSON *output = cJSON_AddObjectToObject(outputs, names[q]);
 
-    AddFinite(output, "median", o->magnitude < 0 ? infinite : o->median);
-    AddFinite(output, "largest", o->magnitude < 0 ? infinite : o->largest);
+    AddFinite(output, "median", o->median < 0 ? infinite : o->median);
+    AddFinite(output, "largest", o->median < 0 ? infinite : o->largest);
     AddFinite(output, "magnitude", o->magnitude < 0 ? infinite : o->magnitude);
     cJSON_AddBoolToObject(output, "estimated", o->estimated);
   }

@@ -28,7 +28,7 @@ PetscErrorCode DriverReportHistory(cJSON *json, HycoScene scene, const HycoHisto
   cJSON_AddNumberToObject(history, "t_end", h->t);
   cJSON_AddStringToObject(history, "newton", h->newton);
   ReportNumbers(history, {"factor_in_solves", h->factor_cost}, {"newton_order", h->order},
-                {"newton_orders", h->n_orders}, {"steps_limited", h->n_bound}, {"rate_change", h->rate_change});
+                {"newton_orders", h->n_orders}, {"steps_limited", h->n_bound}, {"time_error", h->time_error});
   PetscCall(DriverReportSteps(history, scene, PETSC_FALSE, h->n, h->step));
   /* Sums over the steps, of which the table has each. */
   for (PetscInt k = 0; k < h->n; k++) {
@@ -72,7 +72,7 @@ static PetscErrorCode PrintEnd(const HycoHistory *h)
                     "faster, with a larger error in time; compare the results",
                     (int)h->n_bound));
   PetscCall(DriverPrint("\n"));
-  PetscCall(DriverWarnSteps(h->rate_change));
+  PetscCall(DriverWarnSteps(h->time_error));
   PetscCall(DriverPrint("largest KKT residual %.1e, energy balance to %.1e\n", (double)residual, (double)defect));
   PetscCall(DriverPrint("seconds: %.3f in all, %.3f factors, %.3f solves, %.3f laws\n", (double)seconds[0],
                         (double)seconds[1], (double)seconds[2], (double)seconds[3]));

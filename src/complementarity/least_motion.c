@@ -7,10 +7,12 @@
 #include <hycolcp.h>
 #include <petscblaslapack.h>
 
-#define FREE 1e-14 /* squared share of a motion that the closed contacts resist: below, they leave it free */
-#define HELD 1e-12 /* of the largest force: smaller ones hold nothing */
-#define LAST 1e-12 /* squared weight of the motion itself, which decides what no slip of a closed contact does */
-#define TINY 1e-12 /* of the largest gap or slip: round-off */
+#define FREE  1e-14 /* squared share of a motion that the closed contacts resist: below, they leave it free */
+#define HELD  1e-12 /* of the largest force: smaller ones hold nothing */
+#define LAST  1e-12 /* squared weight of the motion itself, which decides what no slip of a closed contact does */
+#define HOLDS 1e-10 /* share of the largest force below which a force holds no motion that another would */
+#define EDGE  1e-6  /* of the tangential force: nearer to the border of the cone a contact slips */
+#define TINY  1e-12 /* of the largest gap or slip: round-off */
 
 /* Coulomb's law: its first datum is the coefficient. */
 PetscBool HycoBlockRubs(const HycoBlocks *b, PetscInt k)
@@ -19,9 +21,9 @@ PetscBool HycoBlockRubs(const HycoBlocks *b, PetscInt k)
 }
 
 /* The free motions (p x n by columns) of the rows of blocks with a force, on scaled motions: tangents hold where there is
-   friction. */
+   friction; slips (or NULL): not where it slips. */
 static PetscErrorCode FreeMotions(const HycoBlocks *b, PetscInt p, const PetscReal A[], const PetscReal scale[],
-                                  const PetscBool closed[], PetscInt *n, PetscReal N[])
+                                  const PetscBool closed[], const PetscBool slips[], PetscInt *n, PetscReal N[])
 {
   PetscReal *gram, *value, *work;
   PetscBLASInt size, lwork, info;
@@ -32,7 +34,7 @@ static PetscErrorCode FreeMotions(const HycoBlocks *b, PetscInt p, const PetscRe
   PetscCall(PetscCalloc3(p * p, &gram, p, &value, 8 * p, &work));
   for (PetscInt k = 0; k < b->n; k++) {
     for (PetscInt j = b->row[k]; j < b->row[k + 1] && closed[k]; j++) {
-      if (j > b->row[k] && !HycoBlockRubs(b, k)) continue;
+      if (j > b->row[k] && (!HycoBlockRubs(b, k) || (slips && slips[k]))) continue;
       for (PetscInt i = 0; i < p * p; i++)
         gram[i] += A[j * p + i / p] * A[j * p + i % p] / (scale[i / p] * scale[i % p]);
     }
@@ -120,6 +122,69 @@ static PetscErrorCode KeepGaps(const HycoBlocks *b, PetscInt p, PetscInt n, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The lengths of the motions on all rows: of one unit with them. */
+static void ScaleMotions(const HycoBlocks *b, PetscInt p, const PetscReal A[], PetscReal scale[])
+{
+  for (PetscInt j = 0; j < p * b->row[b->n]; j++) scale[j % p] += PetscSqr(A[j]);
+  for (PetscInt i = 0; i < p; i++) scale[i] = scale[i] > 0 ? PetscSqrtReal(scale[i]) : 1;
+}
+
+/* Of the free motions the one along the friction f (p) of the contacts that slip, in the metric of all rows: whatever the
+   basis of the motions is, the same. */
+static PetscErrorCode AlongFriction(const HycoBlocks *b, PetscInt p, const PetscReal A[], const PetscReal f[],
+                                    PetscInt n, const PetscReal N[], PetscReal first[])
+{
+  const PetscBLASInt size = (PetscBLASInt)n, one = 1;
+  PetscBLASInt info, *pivot;
+  PetscReal *a, *gram, *c, most = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(first, N, p));
+  PetscCall(PetscCalloc4(n, &a, n * n, &gram, n, &c, n, &pivot));
+  for (PetscInt j = 0; j < b->row[b->n]; j++) {
+    OnMotions(p, n, A + (size_t)j * (size_t)p, N, a);
+    AddSquare(n, 1, a, 0, gram, c);
+  }
+  OnMotions(p, n, f, N, c);
+  LAPACKgesv_(&size, &one, gram, &size, pivot, c, &size, &info);
+  for (PetscInt k = 0; k < n; k++) most = PetscMax(most, PetscAbsReal(c[k]));
+  for (PetscInt i = 0; i < p && !info && most > 0; i++) {
+    first[i] = 0;
+    for (PetscInt k = 0; k < n; k++) first[i] += N[k * p + i] * c[k] / most;
+  }
+  PetscCall(PetscFree4(a, gram, c, pivot));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Slipping contacts hold no motion along their surface. */
+PetscErrorCode HycoBlocksLoose(const HycoBlocks *b, PetscInt p, const PetscReal A[], const PetscReal r[], PetscInt *n,
+                               PetscReal first[])
+{
+  PetscReal *scale, *N, *f, most = 0;
+  PetscBool *closed, *slips;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc5(p, &scale, p * p, &N, p, &f, b->n + 1, &closed, b->n + 1, &slips));
+  ScaleMotions(b, p, A, scale);
+  for (PetscInt k = 0; k < b->n; k++) most = PetscMax(most, r[b->row[k]]);
+  for (PetscInt k = 0; k < b->n; k++) {
+    const PetscReal force = r[b->row[k]];
+    PetscReal shear = 0;
+
+    for (PetscInt j = b->row[k] + 1; j < b->row[k + 1]; j++) shear += r[j] * r[j];
+    closed[k] = (PetscBool)(most > 0 && force > HOLDS * most);
+    slips[k] = (PetscBool)(HycoBlockRubs(b, k) && PetscSqrtReal(shear) >= (1 - EDGE) * b->data[b->at[k]] * force);
+    for (PetscInt j = b->row[k] + 1; j < b->row[k + 1] && slips[k]; j++) {
+      for (PetscInt i = 0; i < p; i++) f[i] += A[j * p + i] * r[j];
+    }
+  }
+  *n = 0;
+  if (most > 0) PetscCall(FreeMotions(b, p, A, scale, closed, slips, n, N));
+  if (*n) PetscCall(AlongFriction(b, p, A, f, *n, N, first));
+  PetscCall(PetscFree5(scale, N, f, closed, slips));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A: p x rows by columns; w changes by -A^T x. */
 PetscErrorCode HycoBlocksStay(const HycoBlocks *b, PetscInt p, const PetscReal A[], const PetscReal w[],
                               const PetscReal r[], const PetscReal move[], PetscReal x[], PetscInt *n,
@@ -130,11 +195,10 @@ PetscErrorCode HycoBlocksStay(const HycoBlocks *b, PetscInt p, const PetscReal A
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc3(p, &scale, p * p, &N, b->n + 1, &closed));
-  for (PetscInt j = 0; j < p * b->row[b->n]; j++) scale[j % p] += PetscSqr(A[j]);
-  for (PetscInt i = 0; i < p; i++) scale[i] = scale[i] > 0 ? PetscSqrtReal(scale[i]) : 1;
+  ScaleMotions(b, p, A, scale);
   for (PetscInt k = 0; k < b->n; k++) most = PetscMax(most, r[b->row[k]]);
   for (PetscInt k = 0; k < b->n; k++) closed[k] = (PetscBool)(most > 0 && r[b->row[k]] > HELD * most);
-  PetscCall(FreeMotions(b, p, A, scale, closed, n, N));
+  PetscCall(FreeMotions(b, p, A, scale, closed, NULL, n, N));
   PetscCall(PetscArrayzero(x, p));
   PetscCall(PetscArraycpy(first, N, p));
   PetscCall(PetscCalloc5(*n * *n + 1, &H, *n + 1, &g, *n + 1, &a, *n + 1, &c, *n * *n + 1, &E));

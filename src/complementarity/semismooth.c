@@ -55,6 +55,7 @@ typedef struct {
   PetscReal judged;               /* |F| without the round-off of the loads on free unknowns */
   HycoConeStep *linear;
   PetscBool slides; /* no forces balance the loads */
+  PetscBool near;   /* nor did they in an earlier problem of the path */
   PetscInt rubs;    /* blocks with friction */
   PetscBool smooth; /* floating bodies, and a coefficient of friction is 0: J may lack rank along their motions */
   PetscBool soft;   /* the scales are those without motions on soft supports */
@@ -762,12 +763,16 @@ static PetscErrorCode FromBefore(Newton *h, PetscReal z[], HycoLCPStatus *status
 
   PetscFunctionBegin;
   HycoDuplicate(h->n, z, &given);
-  if (h->rubs || !h->p)
+  /* Near where a body slides away, a search among forces that do not exist is the dearest. */
+  if (h->near) PetscCall(SlidesAway(h, z));
+  if (h->slides)
+    *status = HYCO_LCP_RAY;
+  else if (h->rubs || !h->p)
     PetscCall(FromForces(h, z, status));
   else
     PetscCall(FromNormal(h, z, status));
   /* Before other starts: no start would find any. */
-  if (*status != HYCO_LCP_SOLVED) PetscCall(SlidesAway(h, z));
+  if (*status != HYCO_LCP_SOLVED && !h->near) PetscCall(SlidesAway(h, z));
   if (h->slides) *status = HYCO_LCP_RAY;
   /* Floating bodies have no soft motions: they are unknowns. */
   if (*status != HYCO_LCP_SOLVED && !h->p) PetscCall(SetScales(h, &soft));
@@ -806,6 +811,7 @@ static PetscErrorCode Chain(Newton *h, PetscReal z[], HycoLCPStatus *status)
 struct _n_HycoConeFactor {
   HycoConeStep step;
   PetscInt n_blocks, *row; /* of the blocks that it is for; NULL: none yet */
+  PetscBool slid;          /* in one of the problems a body slid away */
   PetscReal *rho;
   PetscReal *scaled, flexibility; /* with free unknowns: M in units of forces and lengths, NULL: not yet; of a typical
                                      contact */
@@ -901,6 +907,7 @@ void HycoConeFactorForget(HycoConeFactor f)
 {
   if (!f || !f->row) return;
   HycoConeStepSetMatrix(&f->step, NULL);
+  f->slid = PETSC_FALSE;
   PetscCallVoid(PetscFree(f->scaled));
 }
 
@@ -988,7 +995,9 @@ PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *it
   }
   PetscCall(ScaleFree(&h, f, z));
   for (PetscInt i = h.p; i < n; i++) h.start = PetscMax(h.start, PetscAbsReal(z[i]));
+  h.near = f->slid;
   PetscCall(Chain(&h, z, status));
+  f->slid = (PetscBool)(f->slid || h.slides);
   if (lcp->sign) *lcp->sign = 0;
   /* Before DropRounding() and the scaling back: z is that of h's problem. */
   if ((lcp->cone || lcp->sign) && *status == HYCO_LCP_SOLVED) PetscCall(DeriveAt(&h, z));

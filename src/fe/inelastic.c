@@ -721,6 +721,51 @@ PetscErrorCode HycoFEStateVariable(HycoFE fe, HycoFEState state, const char name
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of the batch's points, which do not move: only creep strains them. */
+static PetscErrorCode BatchRates(HycoFE fe, const HycoElement *el, Batch *b, PetscReal rate[], PetscReal *largest)
+{
+  PetscBool failed = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  if (!b->n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Gather(fe, el, b));
+  PetscCall(Update(fe, fe->mesh->cell_body[b->cell[0]], b->n * el->nq, b, &failed));
+  if (!failed) Complete(fe, el, b);
+  for (PetscInt i = 0; i < b->n * el->nq; i++) {
+    const PetscInt cell = b->cell[i / el->nq];
+
+    rate[cell * el->nq + i % el->nq] = failed ? 0 : b->increment[i] / (b->t1 - b->t0);
+    *largest = PetscMax(*largest, *PointAt(fe, b->begin, cell, i % el->nq).accumulated);
+  }
+  b->n = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A step without strain in so short a time that stresses do not change. Begin and end are one state: what Gather() writes
+   is what it has. */
+PetscErrorCode HycoFERates(HycoFE fe, const PetscReal u[], PetscReal t, PetscReal dt, HycoFEState state,
+                           PetscReal rate[], PetscReal *largest)
+{
+  const HycoMesh m = fe->mesh;
+  const HycoElement *el = HycoElementGet(m->type);
+  HycoFEStepReport report = {.dt_factor = 1};
+  Batch b = {.u = u, .t0 = t, .t1 = t + dt, .begin = state, .end = state, .report = &report};
+
+  PetscFunctionBegin;
+  *largest = 0;
+  PetscCall(HycoFEKeepGradients(fe));
+  PetscCall(BatchCreate(fe, &b));
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    if (fe->scene->body[m->cell_body[e]].law->linear) continue;
+    if (b.n == BATCH || (b.n && m->cell_body[e] != m->cell_body[b.cell[0]]))
+      PetscCall(BatchRates(fe, el, &b, rate, largest));
+    b.cell[b.n++] = e;
+  }
+  PetscCall(BatchRates(fe, el, &b, rate, largest));
+  PetscCall(BatchDestroy(&b));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* In no time creep does nothing: what deforms or fails now yields. */
 PetscErrorCode HycoFEYields(HycoFE fe, PetscReal t, PetscBool *yields)
 {

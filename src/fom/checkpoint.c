@@ -176,7 +176,9 @@ static PetscErrorCode MoveState(HycoFOM f, PetscBool out, PetscInt cols, PetscRe
 }
 
 /* Number of reals that describe the position on the path. */
-#define N_HEAD (4 + (PetscInt)(sizeof(HycoWork) / sizeof(PetscReal)) + (PetscInt)(sizeof(HycoKKT) / sizeof(PetscReal)))
+#define N_POSITION 8
+#define N_HEAD                                                                                                         \
+  (N_POSITION + (PetscInt)(sizeof(HycoWork) / sizeof(PetscReal)) + (PetscInt)(sizeof(HycoKKT) / sizeof(PetscReal)))
 /* The numbers of a path that resume needs beside its fields. HycoWork and HycoKKT consist of reals alone. */
 static void MoveHead(HycoPath p, PetscBool out, PetscReal head[])
 {
@@ -189,15 +191,23 @@ static void MoveHead(HycoPath p, PetscBool out, PetscReal head[])
     /* Exact: numbers of steps are below 2^53. */
     head[2] = (PetscReal)p->step;
     head[3] = (PetscReal)p->n_steps;
-    memcpy(head + 4, work, n_work * sizeof(PetscReal));
-    memcpy(head + 4 + n_work, kkt, n_kkt * sizeof(PetscReal));
+    head[4] = p->time_error;
+    head[5] = p->largest;
+    head[6] = p->ahead;
+    head[7] = p->rated_by;
+    memcpy(head + N_POSITION, work, n_work * sizeof(PetscReal));
+    memcpy(head + N_POSITION + n_work, kkt, n_kkt * sizeof(PetscReal));
   } else {
     p->t = head[0];
     p->dt = head[1];
     p->step = (PetscInt)head[2];
     p->n_steps = (PetscInt)head[3];
-    memcpy(work, head + 4, n_work * sizeof(PetscReal));
-    memcpy(kkt, head + 4 + n_work, n_kkt * sizeof(PetscReal));
+    p->time_error = head[4];
+    p->largest = head[5];
+    p->ahead = head[6];
+    p->rated_by = head[7];
+    memcpy(work, head + N_POSITION, n_work * sizeof(PetscReal));
+    memcpy(kkt, head + N_POSITION + n_work, n_kkt * sizeof(PetscReal));
   }
 }
 

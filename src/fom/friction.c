@@ -288,14 +288,46 @@ PetscErrorCode HycoFrictionMoves(HycoFOM f, PetscBool *moves)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where a body may move freely because a coefficient is 0, it stays: with the least slip. The first such motion under a
-   force is named. */
+/* Names the first motion that no contact force holds at the accepted time, and notes the time. Slips of later steps begin
+   from there. */
+static PetscErrorCode NameLoose(HycoFOM f)
+{
+  HycoFriction r = f->friction;
+  HycoPath path = f->path;
+  HycoMotions motions;
+  HycoBlocks *blocks;
+  PetscReal *A, *L, *first;
+  PetscInt p, n, loose = 0;
+  const Vec *v;
+
+  PetscFunctionBegin;
+  PetscCall(HycoKernelVectors(f->K, &p, &v));
+  if (!p) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoBlocksGather(HycoComm(f), r->system->blocks, &blocks));
+  PetscCall(VecGetSize(r->L, &n));
+  PetscCall(PetscMalloc3(p * n, &A, n, &L, p, &first));
+  PetscCall(HycoMotionRows(r->B, p, v, r->work, A));
+  PetscCall(HycoVecGather(r->L, L));
+  PetscCall(HycoBlocksLoose(blocks, p, A, L, &loose, first));
+  if (loose && !path->loose[0]) {
+    /* In the order of the null space, which is made from them. */
+    PetscCall(HycoFEFreeMotions(HycoComm(f), f->fe, &motions));
+    if (motions.n == p) HycoMotionsName(f->fe, &motions, first, path->loose);
+    PetscCall(HycoMotionsDestroy(&motions));
+    path->loose_at[0] = path->t;
+  }
+  if (loose) path->loose_at[1] = path->t;
+  PetscCall(PetscFree3(A, L, first));
+  PetscCall(HycoBlocksDestroy(&blocks));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where a body may move freely because a coefficient is 0, it stays: with the least slip. */
 static PetscErrorCode Stay(HycoFOM f)
 {
   HycoFriction r = f->friction;
-  HycoMotions motions;
   HycoBlocks *blocks;
-  PetscReal *A, *w, *L, *move, *x, *first, most;
+  PetscReal *A, *w, *L, *move, *x, *first;
   PetscInt p, n, loose;
   PetscBool moves;
   const Vec *v;
@@ -317,13 +349,6 @@ static PetscErrorCode Stay(HycoFOM f)
   PetscCall(HycoVecGather(r->L, L));
   PetscCall(HycoBlocksStay(blocks, p, A, w, L, move, x, &loose, first));
   if (loose) PetscCall(VecMAXPY(f->U, p, x, (Vec *)v));
-  PetscCall(VecNorm(f->Lambda, NORM_INFINITY, &most));
-  if (loose && most > 0 && !f->path->loose[0]) {
-    /* In the order of the null space, which is made from them. */
-    PetscCall(HycoFEFreeMotions(HycoComm(f), f->fe, &motions));
-    if (motions.n == p) HycoMotionsName(f->fe, &motions, first, f->path->loose);
-    PetscCall(HycoMotionsDestroy(&motions));
-  }
   PetscCall(PetscFree6(A, w, L, move, x, first));
   PetscCall(HycoBlocksDestroy(&blocks));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -335,6 +360,7 @@ PetscErrorCode HycoFrictionTake(HycoFOM f)
   PetscFunctionBegin;
   PetscCall(TakeForces(f));
   PetscCall(Stay(f));
+  PetscCall(NameLoose(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -10,6 +10,13 @@
 #define SLIDES 1e-6 /* of the whole time: the smallest step before a body slides away */
 #define GROWTH 1.5
 #define CREEPS 1e-12 /* a smaller inelastic strain of a whole path is round-off of elastic strains */
+/* The share of the tolerance that a step may have whose own strain is small: a hundredth of the strain of the interval.
+   Relaxation (n = 3 to 8, to a tenth of the stress) then takes 150 to 250 steps, and its strain is right to 0.4 %. */
+#define SHARE     0.01
+#define SHORT     1e-4 /* of a step: a time in which stresses do not change */
+#define LATE      1.3  /* times the length that the error permits: a longer step is tried again */
+#define AIM       0.8  /* times that length is the next step */
+#define LEAST_CUT 0.05 /* shortest step after one that was too long */
 
 const char *const HycoNewtons[] = {"auto", "tangent", "elastic", "modified", NULL};
 
@@ -25,7 +32,7 @@ PetscErrorCode HycoPathNew(MPI_Comm comm, HycoScene scene, HycoPath *path)
   p->rtol = 1e-10;
   p->bound = 1e-3;
   p->smallest = 1e-10;
-  p->substeps = 1;
+  p->time_tol = 1e-2;
   /* Without inelastic laws the stiffness is constant and one iteration solves a step. */
   p->flows = (PetscBool)(scene && HycoSceneFlows(scene));
   *path = p;
@@ -72,7 +79,7 @@ PetscErrorCode HycoPathFree(HycoPath *path)
   PetscCall(HycoSeriesDestroy(&p->series));
   PetscCall(HycoFEStateDestroy(&p->begin));
   PetscCall(HycoFEStateDestroy(&p->end));
-  HycoFreeAll(&p->f_local, &p->u0, &p->steps, &p->orders, &p->taken, path);
+  HycoFreeAll(&p->f_local, &p->u0, &p->steps, &p->orders, &p->taken, &p->rate[0], &p->rate[1], path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -96,8 +103,14 @@ PetscErrorCode HycoPathSetFromOptions(HycoPath p, HycoOptionItems PetscOptionsOb
                             1e3, &p->bound, NULL));
   PetscCall(HycoOptionsReal("-hyco_step_smallest", "history: smallest step, as a share of the whole time", 1e-15, 1,
                             &p->smallest, NULL));
-  PetscCall(HycoOptionsInt("-hyco_substeps", "history: smallest number of steps from one listed time to the next", 1,
-                           1000000000, &p->substeps, NULL));
+  PetscCall(HycoOptionsReal("-hyco_step_error",
+                            "history: estimated error of creep strains in a step, relative to the larger of the step's "
+                            "strain and a hundredth of the largest inelastic strain, above which it is shortened (0: "
+                            "none is; not with -hyco_substeps)",
+                            0, 1e3, &p->time_tol, NULL));
+  PetscCall(HycoOptionsInt(
+      "-hyco_substeps", "history: smallest number of steps from one listed time to the next (0: by -hyco_step_error)",
+      0, 1000000000, &p->substeps, NULL));
   PetscCall(HycoOptionsString("-hyco_checkpoint",
                               "<file.h5> history: store the last accepted step there, for -hyco_resume", p->checkpoint,
                               sizeof(p->checkpoint), NULL));
@@ -123,7 +136,8 @@ PetscErrorCode HycoPathBegin(HycoPath p, const PetscReal mu[])
   p->t = p->scene->times[0];
   p->slides[0] = p->loose[0] = '\0';
   p->step = p->n_steps = p->n_orders = p->n_taken = p->n_cuts = p->n_bound = 0;
-  p->rate = p->crept = p->changed = 0;
+  p->time_error = p->largest = p->ahead = p->rated_by = 0;
+  p->rated = PETSC_FALSE;
   /* The first step goes as far as the listed times and the kinks allow. */
   p->dt = PETSC_MAX_REAL;
   p->ended = PETSC_FALSE;
@@ -151,17 +165,6 @@ static PetscErrorCode NoteOrder(HycoPath p, PetscReal order)
   HycoGrow(p->n_orders, p->room_orders, p->orders);
   p->orders[p->n_orders++] = order;
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Strains of creep grow by the rate at the end of a step, so that a change of the rate within it is an error in time. */
-static void NoteRate(HycoPath p, PetscReal h, PetscReal increment)
-{
-  const PetscReal rate = increment / h;
-
-  p->crept += increment;
-  /* The first step counts as a whole: fewer than five cannot show that the rate is resolved. */
-  p->changed += PetscAbsReal(rate - p->rate) * h;
-  p->rate = rate;
 }
 
 /* Makes the attempt the state of the path at t1. States are exchanged, not copied: the former begin is the room of
@@ -207,30 +210,95 @@ static void Count(HycoPath p, const HycoStepAttempt *a)
   p->n_cuts++;
 }
 
+/* An estimate of the error of creep strains in a step; allowed: the length at which it is as large as it may be. */
+typedef struct {
+  PetscReal error, allowed, largest;
+} TimeError;
+
+/* The rates at the begin of the first step; those of others are known. Collective. */
+static PetscErrorCode FirstRates(HycoPath p, PetscReal h)
+{
+  const PetscInt n = p->flows && p->ops->rates ? p->fe->mesh->n_cells * HycoElementGet(p->fe->mesh->type)->nq : 0;
+
+  PetscFunctionBegin;
+  p->rates = (PetscBool)(p->flows && p->ops->rates && !p->given);
+  if (!p->rates || p->rated) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt k = 0; k < 2 && !p->rate[k]; k++) PetscCall(PetscCalloc1(n + 1, &p->rate[k]));
+  /* As after the step before where the path goes on from a checkpoint, so that its steps are the same. */
+  if (!(p->rated_by > 0)) p->rated_by = h;
+  PetscCall((*p->ops->rates)(p, p->t, SHORT * p->rated_by, p->begin, p->rate[0], &p->largest));
+  p->rated = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Implicit Euler takes the rate at the end of a step for its mean: the estimate is half of the rate's change times the
+   length, over all points, and at most the point's strain, as where creep begins with an infinite rate. Collective. */
+static PetscErrorCode EstimateTime(HycoPath p, PetscReal h, PetscReal t1, TimeError *e)
+{
+  const PetscInt n = p->fe->mesh->n_cells * HycoElementGet(p->fe->mesh->type)->nq;
+  PetscReal most[2] = {0, 0}, permitted;
+
+  PetscFunctionBegin;
+  PetscCall((*p->ops->rates)(p, t1, SHORT * h, p->end, p->rate[1], &e->largest));
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscReal strain = h * p->rate[1][i], change = h * PetscAbsReal(p->rate[1][i] - p->rate[0][i]) / 2;
+
+    most[0] = PetscMax(most[0], PetscMin(change, strain));
+    most[1] = PetscMax(most[1], strain);
+  }
+  HycoAllreduce(most, 2, MPIU_REAL, MPI_MAX, p->comm);
+  e->error = most[0];
+  p->ahead = PetscMax(p->ahead, e->largest);
+  permitted = p->time_tol * PetscMax(most[1], SHARE * p->ahead);
+  /* Nor where the sum is small. */
+  permitted = PetscMax(permitted, p->time_tol * p->ahead - p->time_error);
+  if (e->error > 0 && p->ahead > CREEPS && p->time_tol > 0 && !p->substeps) e->allowed = h * permitted / e->error;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rates at the end of the accepted step are those at the begin of the next. */
+static void TakeRates(HycoPath p, PetscReal h, const TimeError *e)
+{
+  PetscReal *rate = p->rate[0];
+
+  if (!p->rates) return;
+  p->rate[0] = p->rate[1];
+  p->rate[1] = rate;
+  p->rated_by = h;
+  p->time_error += e->error;
+  p->largest = e->largest;
+}
+
 /* One attempt at a step to `stop`, or by p->dt; advances p->t if it is accepted. The rest of the interval is divided
    evenly: no tiny last step. 1e-9 allows for round-off of rest / dt. */
 static PetscErrorCode TryStep(HycoPath p, PetscReal stop)
 {
   const PetscReal rest = stop - p->t, n = PetscCeilReal(rest / p->dt - 1e-9), h = n > 1 ? rest / n : rest;
+  const PetscReal t1 = n > 1 ? p->t + h : stop;
+  TimeError e = {.allowed = PETSC_MAX_REAL};
   HycoStepAttempt a;
 
   PetscFunctionBegin;
-  PetscCall(HycoPathAttempt(p, p->t, n > 1 ? p->t + h : stop, &a));
-  if (a.converged && a.law.increment > p->bound && !p->given) {
+  PetscCall(FirstRates(p, h));
+  PetscCall(HycoPathAttempt(p, p->t, t1, &a));
+  if (a.converged && p->rates) PetscCall(EstimateTime(p, h, t1, &e));
+  if (a.converged && ((a.law.increment > p->bound && !p->given) || LATE * e.allowed < h)) {
     a.converged = PETSC_FALSE;
     /* A converged step is rejected for its accuracy: what it found is undone. */
     HycoFormat(a.why, "the increment of inelastic strain is %.1e in one step", (double)a.law.increment);
+    if (LATE * e.allowed < h) HycoFormat(a.why, "the error in time of one step is %.1e", (double)e.error);
     PetscCall(HycoPathRestore(p));
   }
   Count(p, &a);
   if (!a.converged) {
     /* At least halved; a law may ask for less. */
     p->dt = h * PetscMin(0.5, a.law.dt_factor > 0 ? a.law.dt_factor : 0.5);
+    p->dt = PetscMin(p->dt, PetscMax(e.allowed, LEAST_CUT * h));
     PetscCall(PetscStrncpy(p->why, a.why, sizeof(p->why)));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(Accept(p, n > 1 ? p->t + h : stop, &a));
-  NoteRate(p, h, a.law.increment);
+  PetscCall(Accept(p, t1, &a));
+  TakeRates(p, h, &e);
   /* The next size: prescribed times are followed as given; a law's wish to shorten goes before growth. */
   if (p->given)
     p->dt = PetscMax(p->dt, GROWTH * h);
@@ -241,14 +309,20 @@ static PetscErrorCode TryStep(HycoPath p, PetscReal stop)
   else
     /* Converged easily, but the bound on the inelastic increment forbids growth: counted for the report. */
     p->n_bound += a.easy;
+  /* Whatever convergence permits. */
+  p->dt = PetscMin(p->dt, PetscMax(AIM * e.allowed, LEAST_CUT * h));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The next of the prescribed times, if any. */
+/* The next of the prescribed times, or of the stops, if any. */
 static PetscReal NextGiven(HycoPath p)
 {
-  for (PetscInt k = 0; p->given && k < p->n_given; k++) {
-    if (p->given[k] > p->t) return p->given[k];
+  const PetscBool stops = (PetscBool)(!p->given && !p->substeps && p->time_tol > 0);
+  const PetscInt n = p->given ? p->n_given : stops ? p->n_stops : 0;
+  const PetscReal *at = p->given ? p->given : p->stops;
+
+  for (PetscInt k = 0; k < n; k++) {
+    if (at[k] > p->t) return at[k];
   }
   return PETSC_MAX_REAL;
 }
@@ -266,7 +340,7 @@ static PetscErrorCode Reach(HycoPath p, PetscReal end, PetscBool *reached)
     const PetscReal t = p->t, stop = PetscMin(HycoSceneNextStop(s, p->t), NextGiven(p));
 
     /* Prescribed times replace the request. */
-    if (p->substeps > 1 && !p->given) p->dt = PetscMin(p->dt, (end - s->times[p->step - 1]) / (PetscReal)p->substeps);
+    if (p->substeps && !p->given) p->dt = PetscMin(p->dt, (end - s->times[p->step - 1]) / (PetscReal)p->substeps);
     PetscCall(HycoInterruptCheck());
     PetscCall(TryStep(p, stop));
     /* Where a body slides away in a larger step, its time is known well enough: steps just before it are the dearest. */
@@ -322,6 +396,7 @@ static PetscErrorCode Advance(HycoPath p, PetscBool *reached)
   if (!*reached) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Record(p));
   p->step++;
+  p->ahead = p->largest;
   /* After each listed time at the latest; the full order also saves between. */
   if (p->ops->save) PetscCall((*p->ops->save)(p));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -340,6 +415,14 @@ PetscErrorCode HycoPathRun(HycoPath p)
   if (!reached) PetscCall(HycoPathAssemble(p, p->t)); /* returns from the time that was not reached */
   if (!reached && p->now.substeps) PetscCall(Record(p));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoPathNameTimes(const char name[], const PetscReal at[2], char text[HYCO_LINE])
+{
+  char to[32] = "";
+
+  if (at[1] > at[0]) snprintf(to, sizeof(to), " to %g", (double)at[1]);
+  HycoFormat(text, "%s (t = %g%s)", name, (double)at[0], to);
 }
 
 /* The quantity's own extreme, unless the scene names another for the path. */
@@ -381,7 +464,7 @@ void HycoPathGetHistory(HycoPath p, HycoHistory *h)
   h->newton = HycoNewtons[HycoPathMethod(p)];
   h->factor_cost = HycoPathFactorCost(p);
   h->n_bound = p->n_bound;
-  h->rate_change = p->crept > CREEPS && p->creeps ? p->changed / p->crept : 0;
+  h->time_error = p->largest > CREEPS ? p->time_error / p->largest : 0;
   h->n_orders = p->n_orders;
   h->n_taken = p->n_taken;
   h->taken = p->taken;

@@ -7,9 +7,10 @@
 /* A scene without times would ignore these options silently. */
 PetscErrorCode HycoPathRefuseOptions(HycoFOM f)
 {
-  static const char *const name[] = {
-      "-hyco_newton",   "-hyco_newton_rtol", "-hyco_newton_max_its", "-hyco_step_inelastic", "-hyco_step_smallest",
-      "-hyco_substeps", "-hyco_checkpoint",  "-hyco_resume",         "-hyco_write_fclib",    "-hyco_write_fclib_time"};
+  static const char *const name[] = {"-hyco_newton",         "-hyco_newton_rtol",     "-hyco_newton_max_its",
+                                     "-hyco_step_inelastic", "-hyco_step_smallest",   "-hyco_step_error",
+                                     "-hyco_substeps",       "-hyco_checkpoint",      "-hyco_resume",
+                                     "-hyco_write_fclib",    "-hyco_write_fclib_time"};
 
   PetscFunctionBegin;
   for (size_t k = 0; k < sizeof(name) / sizeof(name[0]); k++) {
@@ -124,6 +125,23 @@ static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tan
   PetscCall(VecRestoreArray(f->U_local, &u));
   PetscCall(ReduceReport(f, report));
   if (!report->failed) PetscCall(TakeForces(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* fe is at t, U that of the state. */
+static PetscErrorCode Rates(HycoPath p, PetscReal t, PetscReal dt, HycoFEState state, PetscReal rate[],
+                            PetscReal *largest)
+{
+  HycoFOM f = (HycoFOM)p->ctx;
+  PetscScalar *u;
+
+  PetscFunctionBegin;
+  PetscCall(HycoScatter(f->to_local, f->U, f->U_local));
+  PetscCall(VecGetArray(f->U_local, &u));
+  HycoFEComplete(f->fe, u);
+  HycoOnEach(p->comm, HycoFERates(p->fe, u, t, dt, state, rate, largest));
+  PetscCall(VecRestoreArray(f->U_local, &u));
+  HycoAllreduce(largest, 1, MPIU_REAL, MPI_MAX, p->comm);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -402,6 +420,7 @@ PetscErrorCode HycoFOMPathCreate(HycoFOM f)
                                   .stiffness = Stiffness,
                                   .moves = Moves,
                                   .judge = JudgeStep,
+                                  .rates = Rates,
                                   .accept = Accept,
                                   .record = Record,
                                   .save = Save};
@@ -426,18 +445,6 @@ PetscErrorCode HycoFOMPathCreate(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether rates of inelastic strains mean anything, at the first time. Collective. */
-static PetscErrorCode FindCreep(HycoPath p)
-{
-  PetscBool yields = PETSC_FALSE;
-
-  PetscFunctionBegin;
-  if (p->flows) HycoOnEach(p->comm, HycoFEYields(p->fe, p->t, &yields));
-  HycoAllreduce(&yields, 1, HYCO_MPI_BOOL, MPI_LOR, p->comm);
-  p->creeps = (PetscBool)(p->flows && !yields);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The path at mu, from its first time or from a checkpoint. Not reaching the end is no error. Collective. */
 PetscErrorCode HycoPathSolve(HycoFOM f, const PetscReal mu[])
 {
@@ -446,7 +453,6 @@ PetscErrorCode HycoPathSolve(HycoFOM f, const PetscReal mu[])
 
   PetscFunctionBegin;
   PetscCall(HycoPathBegin(p, mu));
-  PetscCall(FindCreep(p));
   if (f->friction) PetscCall(HycoFrictionBegin(f));
   PetscCall(PetscMemzero(&p->work_done, sizeof(p->work_done)));
   PetscCall(VecSet(p->F_old, 0));

@@ -203,7 +203,8 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   PetscCall(HycoFOMJudge(f, f->u, f->n_contacts ? f->Lambda : NULL, defect, &s->reason, &s->u_relative, why));
   PetscCall(PetscStrncpy(s->why, why, sizeof(s->why)));
   PetscCall(MeasureContacts(f, s));
-  HycoFormat(why, "%s", f->path ? f->path->loose : "");
+  why[0] = '\0';
+  if (f->path && f->path->loose[0]) HycoPathNameTimes(f->path->loose, f->path->loose_at, why);
   /* Of a path at its end, if nothing presses: friction may hold what normal forces do not. */
   if (s->reason > 0 && !f->given && !why[0] && (!f->path || !s->n_active)) PetscCall(HycoFOMNameLoose(f, why));
   PetscCall(PetscStrncpy(s->loose, why, sizeof(s->loose)));

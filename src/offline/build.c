@@ -376,6 +376,9 @@ static PetscErrorCode FillModel(HycoReducer t, HycoROM m)
     for (PetscInt j = 0; j < m->model->l; j++) m->model->V[i * m->model->l + j] = t->V_rid[j * n_dof + i];
   }
   HycoDuplicate(m->model->n_points * n_par, mu, &m->model->points);
+  m->model->n_stops = t->n_stops;
+  m->model->time_error = t->stops_error;
+  HycoDuplicate(t->n_stops, t->stops, &m->model->stops);
   m->model->whole_nodes = t->sizes[0];
   m->model->whole_cells = t->sizes[1];
   m->model->counts[0] = t->counts[HYCO_SEED_DUAL];
@@ -721,7 +724,7 @@ PetscErrorCode HycoReducerClose(HycoReducer t, HycoSnapshots *store)
   PetscCall(HycoSnapshotsGetBalance(*store, &t->unsolved, &written));
   t->sliding = (*store)->sliding;
   t->seconds_solution = (*store)->seconds;
-  t->rate_change = (*store)->rate_change;
+  t->time_error = (*store)->time_error;
   HycoFreeAll(&t->solved, &t->written);
   HycoDuplicate(t->n_solvers, solved, &t->solved);
   HycoDuplicate(HycoSize(HycoComm(t)), written, &t->written);
@@ -1041,7 +1044,7 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
   PetscCall(HycoReducerOpen(t, samples, path, &store));
   HycoFinally(RunOn(t, store, samples, path, &report, &solved), PetscCall(HycoReducerClose(t, &store)));
   report.sliding = t->sliding;
-  report.rate_change = t->rate_change;
+  report.time_error = t->time_error;
   /* Late solves happen inside the reduction: their time is counted with the snapshots. */
   report.seconds_solution = t->seconds_solution;
   report.seconds_snapshots = solved - begin + t->solving;

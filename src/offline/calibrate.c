@@ -9,6 +9,7 @@
 */
 #include <hycoalgorithms.h>
 #include <hycoreducerimpl.h>
+#include <math.h>
 #include <stdio.h>
 
 #define SHARE      0.93
@@ -126,17 +127,19 @@ static PetscErrorCode Fit(PetscInt n, const HycoHeldOut rows[], const PetscReal 
 static PetscErrorCode FitError(PetscInt n, const HycoHeldOut rows[], HycoEstimateKind kind, HycoEstimates *estimates)
 {
   PetscReal *error, median;
-  PetscBool finite = PETSC_TRUE;
+  PetscBool finite = PETSC_TRUE, compared = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n, &error));
   for (PetscInt i = 0; i < n; i++) {
     /* Forces and stresses are guarded: below a tenth of the largest they are relative to that tenth. */
     error[i] = HycoHeldOutError(&rows[i], errors[kind], estimates->force);
+    compared = (PetscBool)(compared || !PetscIsNanReal(error[i]));
+    if (PetscIsNanReal(error[i])) error[i] = 0;
     finite = (PetscBool)(finite && !PetscIsInfOrNanReal(error[i]));
   }
   PetscCall(Median(n, error, 1, PETSC_SMALL, &median));
-  estimates->has[kind] = (PetscBool)(finite && (kind != HYCO_ESTIMATE_LAMBDA || estimates->force > 0));
+  estimates->has[kind] = (PetscBool)(finite && compared && (kind != HYCO_ESTIMATE_LAMBDA || estimates->force > 0));
   if (estimates->has[kind])
     PetscCall(Fit(n, rows, error, NEGLIGIBLE * median, estimates, PETSC_FALSE, estimates->law[kind]));
   PetscCall(PetscFree(error));
@@ -152,24 +155,26 @@ static PetscErrorCode FitOutput(PetscInt n, const HycoHeldOut rows[], const Hyco
 {
   HycoOutputEstimate *o = &estimates->output[q];
   PetscReal *error, *sorted, least, median;
+  PetscInt m = 0;
 
   PetscFunctionBegin;
   *o = (HycoOutputEstimate){.magnitude = -1, .median = -1, .largest = -1};
   for (PetscInt i = 0; i < n; i++) {
-    if (PetscIsInfOrNanReal(found[i].error[q]) || PetscIsInfOrNanReal(found[i].size[q]))
-      PetscFunctionReturn(PETSC_SUCCESS);
+    if (PetscIsInfReal(found[i].error[q]) || PetscIsInfOrNanReal(found[i].size[q])) PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc2(n, &error, n, &sorted));
   for (PetscInt i = 0; i < n; i++) {
-    sorted[i] = error[i] = found[i].error[q];
+    /* NaN: not compared, as the position of a body is arbitrary. */
+    error[i] = PetscIsNanReal(found[i].error[q]) ? 0 : found[i].error[q];
+    if (!PetscIsNanReal(found[i].error[q])) sorted[m++] = error[i];
     o->magnitude = PetscMax(o->magnitude, found[i].size[q]);
   }
-  PetscCall(PetscSortReal(n, sorted));
-  o->median = sorted[n / 2];
-  o->largest = sorted[n - 1];
+  PetscCall(PetscSortReal(m, sorted));
+  o->median = m ? sorted[m / 2] : -1;
+  o->largest = m ? sorted[m - 1] : -1;
   /* Without calibrated features (estimates->n = 0) there is nothing to fit with. */
-  o->has = (PetscBool)(o->magnitude > 0 && estimates->n);
+  o->has = (PetscBool)(m && o->magnitude > 0 && estimates->n);
   PetscCall(Median(n, error, 1, 0, &median));
   /* Smaller errors count as this one: their logarithms would only be noise. */
   least = PetscMax(NEGLIGIBLE * median, HYCO_OUTPUT_ROUND_OFF * o->magnitude);
@@ -288,8 +293,9 @@ static PetscErrorCode Conclude(HycoReducer t, HycoSamples points, PetscInt n, Hy
   PetscFunctionBegin;
   estimates.n_held = v->n;
   for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) {
-    estimates.median[e] = v->median[errors[e]];
-    estimates.largest[e] = v->largest[errors[e]];
+    /* -1: not compared at any point. */
+    estimates.median[e] = PetscIsNanReal(v->median[errors[e]]) ? -1 : v->median[errors[e]];
+    estimates.largest[e] = PetscIsNanReal(v->largest[errors[e]]) ? -1 : v->largest[errors[e]];
   }
   estimates.force = HycoHeldOutForce(n, rows);
   PetscCall(Group(t, points, n, rows));
@@ -352,8 +358,8 @@ PetscErrorCode HycoReducerJudgeCorners(HycoReducer t, HycoSamples corners, Petsc
   /* The scale of forces is that of all points, so that corners with small forces are judged alike. */
   PetscCall(HycoHeldOutSummarise(n_corners, rows + n, HycoHeldOutForce(n + n_corners, rows), &there));
   for (PetscInt e = 0; e < HYCO_N_ERRORS; e++) {
-    held_out->largest[e] = PetscMax(held_out->largest[e], there.largest[e]);
-    held_out->end[e] = PetscMax(held_out->end[e], there.end[e]);
+    held_out->largest[e] = fmax(held_out->largest[e], there.largest[e]); /* NaN: not compared */
+    held_out->end[e] = fmax(held_out->end[e], there.end[e]);
   }
   held_out->not_converged += there.not_converged;
   PetscFunctionReturn(PETSC_SUCCESS);

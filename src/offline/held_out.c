@@ -171,13 +171,13 @@ static PetscErrorCode Compare(Rows *r, const PetscReal mu[], PetscMPIInt of, Hyc
 /* The steps are reset also after an error: they are borrowed from `taken`, which is freed here. */
 PetscErrorCode HycoHeldOutPredict(HycoROM m, HycoSnapshots store, const PetscReal mu[])
 {
-  PetscReal *taken = NULL;
+  PetscReal *taken = NULL, time_error;
   PetscInt n;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   if (m->model->scene->n_times) {
-    PetscCall(HycoSnapshotsReadTaken(store, mu, &n, &taken));
+    PetscCall(HycoSnapshotsReadTaken(store, mu, &n, &taken, &time_error));
     /* Full order's own steps: otherwise the error would include that of different steps in time. */
     PetscCall(HycoROMSetJudgedSteps(m, n, taken));
   }
@@ -355,6 +355,8 @@ static PetscReal Divided(const HycoHeldOut *row, HycoErrorKind kind, PetscReal f
                   by = forces ? PetscMax(size, HYCO_SMALL_FORCE * force) : 1;
 
   if (row->converged < 0.5) return PETSC_INFINITY;
+  /* Where the position of a body is arbitrary, displacements are compared at no time with loads. */
+  if (row->loose > 0 && (kind == HYCO_ERROR_U || kind == HYCO_ERROR_U_RID) && error == 0) return NAN;
   if (by > 0) return error / by;
   return error > 0 ? PETSC_INFINITY : 0;
 }
@@ -364,7 +366,8 @@ PetscReal HycoHeldOutError(const HycoHeldOut *row, HycoErrorKind kind, PetscReal
   return Divided(row, kind, force, row->error[kind]);
 }
 
-/* Infinite errors make the mean infinite, the median of the others stays. */
+/* Infinite errors make the mean infinite, the median of the others stays. Points that were not compared (NaN) do not enter;
+   where none was, nor do they have a value. */
 PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], PetscReal force, HycoValidation *v)
 {
   PetscReal *error;
@@ -384,18 +387,23 @@ PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], PetscR
     v->seconds += seconds[HYCO_HELD_REPEATS / 2] / n;
   }
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
+    PetscInt m = 0;
+
     for (PetscInt k = 0; k < n; k++) {
-      error[k] = HycoHeldOutError(&rows[k], (HycoErrorKind)j, force);
+      error[m] = HycoHeldOutError(&rows[k], (HycoErrorKind)j, force);
+      if (PetscIsNanReal(error[m])) continue;
       v->end[j] = PetscMax(v->end[j], Divided(&rows[k], (HycoErrorKind)j, force, rows[k].end[j]));
-      if (error[k] > v->largest[j]) {
-        v->largest[j] = error[k];
+      if (error[m] > v->largest[j]) {
+        v->largest[j] = error[m];
         v->worst[j] = k;
       }
-      v->mean[j] += error[k] / n;
+      v->mean[j] += error[m++];
     }
-    PetscCall(PetscSortReal(n, error));
+    PetscCall(PetscSortReal(m, error));
+    v->mean[j] /= PetscMax(m, 1);
     /* Infinite errors sort last. */
-    v->median[j] = error[n / 2];
+    v->median[j] = m ? error[m / 2] : 0;
+    if (n && !m) v->median[j] = v->largest[j] = v->end[j] = v->mean[j] = NAN;
   }
   PetscCall(PetscFree(error));
   PetscFunctionReturn(PETSC_SUCCESS);

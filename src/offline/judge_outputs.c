@@ -199,7 +199,7 @@ static PetscErrorCode JudgeOne(Outputs *o, const PetscReal mu[], HycoOutputError
   const PetscInt n_times = PetscMax(1, m->model->scene->n_times), n_q = m->model->scene->n_quantities;
   HycoPrediction p;
   PetscReal value[HYCO_MAX_QUANTITIES];
-  PetscBool known = PETSC_FALSE;
+  PetscBool known = PETSC_FALSE, apart[HYCO_MAX_QUANTITIES] = {PETSC_FALSE};
 
   PetscFunctionBegin;
   PetscCall(MeasurePredicted(o, mu, &p, &known));
@@ -217,7 +217,12 @@ static PetscErrorCode JudgeOne(Outputs *o, const PetscReal mu[], HycoOutputError
       /* A comparison with NaN is false: it must be kept by name. */
       e->error[q] = error > e->error[q] || PetscIsInfOrNanReal(error) ? error : e->error[q];
       e->size[q] = size > e->size[q] || PetscIsInfOrNanReal(size) ? size : e->size[q];
+      apart[q] = (PetscBool)(apart[q] || arbitrary);
     }
+  }
+  /* Compared at no time with loads. */
+  for (PetscInt q = 0; q < n_q; q++) {
+    if (apart[q] && e->error[q] == 0) e->error[q] = NAN;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

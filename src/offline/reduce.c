@@ -838,12 +838,42 @@ PetscErrorCode HycoReducerTakeBases(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The steps of predictions, where full order has chosen its own by their error in time: in each listed interval those of
+   the training path with most of them. */
+static PetscErrorCode ChooseStops(HycoReducer t, PetscInt n, PetscReal time_error)
+{
+  const HycoScene s = t->scene;
+
+  PetscFunctionBegin;
+  t->n_stops = 0;
+  t->stops_error = time_error;
+  for (PetscInt j = 1; j < s->n_times && time_error > 0; j++) {
+    const PetscReal *most = NULL;
+    PetscInt n_most = 0;
+
+    for (PetscInt k = 0; k < n; k++) {
+      const PetscReal *at = t->taken + t->taken_start[k], *end = t->taken + t->taken_start[k + 1];
+      PetscInt count = 0;
+
+      while (at < end && *at <= s->times[j - 1]) at++;
+      while (at + count < end && at[count] < s->times[j]) count++;
+      if (count > n_most) most = at;
+      n_most = PetscMax(n_most, count);
+    }
+    PetscCall(PetscRealloc((size_t)(t->n_stops + n_most + 1) * sizeof(PetscReal), &t->stops));
+    PetscCall(PetscArraycpy(t->stops + t->n_stops, most, n_most));
+    t->n_stops += n_most;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Reads the times of the steps of the training paths. Judging replays the training paths in the steps of full
    order, so that errors of time stepping do not count as the model's. */
 static PetscErrorCode ReadTaken(HycoReducer t, HycoSnapshots store)
 {
   PetscInt n, n_par;
   const PetscReal *mu;
+  PetscReal time_error, most = 0;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->columns, &n, &n_par, &mu));
@@ -852,13 +882,15 @@ static PetscErrorCode ReadTaken(HycoReducer t, HycoSnapshots store)
     PetscReal *taken;
     PetscInt count;
 
-    PetscCall(HycoSnapshotsReadTaken(store, mu + k * n_par, &count, &taken));
+    PetscCall(HycoSnapshotsReadTaken(store, mu + k * n_par, &count, &taken, &time_error));
     PetscCall(PetscRealloc((size_t)(t->taken_start[k] + count + 1) * sizeof(PetscReal), &t->taken));
     PetscCall(PetscArraycpy(t->taken + t->taken_start[k], taken, count));
     /* All paths in one array, since each has its own number of steps. */
     t->taken_start[k + 1] = t->taken_start[k] + count;
     PetscCall(PetscFree(taken));
+    most = PetscMax(most, time_error);
   }
+  PetscCall(ChooseStops(t, n, most));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

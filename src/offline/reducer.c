@@ -122,7 +122,7 @@ PetscErrorCode HycoReducerResetBases(HycoReducer t)
   PetscCall(MatDestroy(&t->S));
   /* Everything that was cut from these solutions or judged on them. */
   HycoFreeAll(&t->U_rid, &t->rid_row, &t->V_rid, &t->Lambda, &t->U_norm, &t->dual_seeds, &t->taken_start, &t->taken,
-              &t->judged, &t->judged_held);
+              &t->stops, &t->judged, &t->judged_held);
   t->n_dual_seeds = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -180,7 +180,7 @@ static void Rate(const Search *s, HycoAttempt *a)
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
     const PetscReal ratio = QuotientOf(s, j, a->held_out.largest[j]);
 
-    if (ratio <= a->ratio) continue;
+    if (!(ratio > a->ratio)) continue; /* NaN: not compared */
     a->ratio = ratio;
     a->worst = (HycoErrorKind)j;
   }
@@ -372,7 +372,7 @@ static PetscErrorCode BuildAndJudge(Search *s, PetscBool all, HycoAttempt *a)
 /* Whether an attempt gave a model of any use. */
 static PetscBool IsUseful(const HycoAttempt *a)
 {
-  return (PetscBool)(!a->failure[0] && (a->beaten_by || a->held_out.largest[HYCO_ERROR_U] < USELESS));
+  return (PetscBool)(!a->failure[0] && (a->beaten_by || !(a->held_out.largest[HYCO_ERROR_U] >= USELESS)));
 }
 
 /* Whether a type with modes of its own has given one, with which a search may end that finds no other. */

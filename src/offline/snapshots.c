@@ -205,7 +205,7 @@ static PetscErrorCode WriteHead(HycoSnapshots s, HycoFOM fom, HycoH5 h, const Pe
     HycoHistory history_of = {0};
 
     HycoPathGetHistory(fom->path, &history_of);
-    s->rate_change = PetscMax(s->rate_change, history_of.rate_change);
+    s->time_error = PetscMax(s->time_error, history_of.time_error);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -419,6 +419,7 @@ static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[]
             (double)history.t, history.why);
   HycoOnRoot(HycoComm(fom), WriteHead(w->s, fom, w->h, mu));
   HycoOnRoot(HycoComm(fom), HycoH5WriteReal(w->h, "taken", history.n_taken, 1, history.taken));
+  HycoOnRoot(HycoComm(fom), HycoH5WriteReal(w->h, "time_error", 1, 1, &history.time_error));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -599,7 +600,7 @@ PetscErrorCode HycoSnapshotsFill(HycoSnapshots s, HycoSamples samples, HycoProgr
   }
   /* Each group's first rank knows its own. */
   HycoAllreduce(&s->sliding, 1, MPIU_REAL, MPI_MAX, HycoComm(s));
-  HycoAllreduce(&s->rate_change, 1, MPIU_REAL, MPI_MAX, HycoComm(s));
+  HycoAllreduce(&s->time_error, 1, MPIU_REAL, MPI_MAX, HycoComm(s));
   PetscCall(PetscFree(m.missing));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -766,8 +767,9 @@ PetscErrorCode HycoSnapshotsHas(HycoSnapshots s, const PetscReal mu[], PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The times of full order's steps; the caller frees them. -1: their number is the file's. */
-PetscErrorCode HycoSnapshotsReadTaken(HycoSnapshots s, const PetscReal mu[], PetscInt *n, PetscReal **taken)
+/* The times of full order's steps, and the estimate of their error; the caller frees them. -1: their number is the file's. */
+PetscErrorCode HycoSnapshotsReadTaken(HycoSnapshots s, const PetscReal mu[], PetscInt *n, PetscReal **taken,
+                                      PetscReal *time_error)
 {
   HycoH5 h;
   PetscInt one = 1;
@@ -776,6 +778,8 @@ PetscErrorCode HycoSnapshotsReadTaken(HycoSnapshots s, const PetscReal mu[], Pet
   *n = -1;
   PetscCall(OpenSample(s, mu, &h));
   PetscCall(HycoH5LoadReal(h, "taken", n, &one, taken));
+  *time_error = 0;
+  if (HycoH5Has(h, "time_error")) PetscCall(HycoH5ReadReal(h, "time_error", 1, 1, time_error)); /* none in older ones */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

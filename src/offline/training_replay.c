@@ -93,12 +93,13 @@ PetscErrorCode HycoTrainingReplayFollow(HycoTrainingReplay *r, HycoSnapshots sto
 {
   HycoReducer t = r->t;
   const PetscReal *mu;
-  PetscReal *taken = NULL;
+  PetscReal *taken = NULL, time_error;
   PetscInt n_par, n = 1;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
-  if (t->scene->n_times) HycoOnEach(HycoComm(t), HycoSnapshotsReadTaken(store, mu + k * n_par, &n, &taken));
+  if (t->scene->n_times)
+    HycoOnEach(HycoComm(t), HycoSnapshotsReadTaken(store, mu + k * n_par, &n, &taken, &time_error));
   /* Without a history one time, 0, at which the laws are linear. */
   else
     PetscCall(PetscCalloc1(1, &taken));

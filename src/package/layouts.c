@@ -43,7 +43,7 @@ static const HycoMember step[] = {
 #define F(member) FIELD(HycoHistory, member)
 static const HycoMember history[] = {
   F(n), F(step), F(ended), F(t), F(why), F(newton), F(factor_cost), F(n_orders), F(order), F(n_taken), F(taken),
-  F(path_quantity), F(n_bound), F(rate_change)};
+  F(path_quantity), F(n_bound), F(time_error)};
 #undef F
 
 #define F(member) FIELD(HycoReaction, member)
@@ -68,7 +68,7 @@ static const HycoMember prediction[] = {
   F(unseen_feature), F(beyond), F(gives_forces), F(interpolation_error), F(kkt.stationarity), F(kkt.penetration),
   F(kkt.adhesion), F(kkt.complementarity), F(kkt.rounding), F(method), F(reason), F(seconds.setup),
   F(seconds.assemble), F(seconds.factor), F(seconds.solve), F(seconds.total), F(n_dependent), F(loose),
-  F(why)};
+  F(why), F(free_motion)};
 #undef F
 
 #define F(member) FIELD(HycoGradient, member)

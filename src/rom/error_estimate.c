@@ -432,8 +432,11 @@ PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
 /* "u 1.2e-04, stress 3e-03, contact forces 2e-02" */
 static void DescribeErrors(const PetscReal error[], char text[HYCO_LINE])
 {
-  snprintf(text, HYCO_LINE, "u %.2g, stress %.2g, contact forces %.2g", (double)error[HYCO_ESTIMATE_U],
-           (double)error[HYCO_ESTIMATE_SIGMA], (double)error[HYCO_ESTIMATE_LAMBDA]);
+  char u[32];
+
+  snprintf(u, sizeof(u), error[HYCO_ESTIMATE_U] < 0 ? "not compared" : "%.2g", (double)error[HYCO_ESTIMATE_U]);
+  snprintf(text, HYCO_LINE, "u %s, stress %.2g, contact forces %.2g", u, (double)error[HYCO_ESTIMATE_SIGMA],
+           (double)error[HYCO_ESTIMATE_LAMBDA]);
 }
 
 /* Errors that were measured, of the held-out points, come before what is estimated from them. */
@@ -452,7 +455,10 @@ PetscErrorCode HycoEstimatesView(HycoROM m, PetscViewer viewer)
   for (PetscInt q = 0; q < t->n_outputs; q++) {
     const HycoOutputEstimate *o = &t->output[q];
 
-    if (o->magnitude >= 0)
+    if (o->magnitude >= 0 && o->median < 0)
+      PetscCall(PetscViewerASCIIPrintf(viewer, "    output %s: not compared, not estimated\n",
+                                       m->model->scene->quantity[q].name));
+    else if (o->magnitude >= 0)
       PetscCall(PetscViewerASCIIPrintf(viewer,
                                        "    output %s: median %.2g, largest %.2g (values up to %.4g); error %s\n",
                                        m->model->scene->quantity[q].name, (double)o->median, (double)o->largest,

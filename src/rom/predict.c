@@ -95,8 +95,9 @@ PetscErrorCode HycoROMPredict(HycoROM m, PetscInt n, const PetscReal mu[])
   m->remainder = 0;
   m->imbalance = m->corrected = -1;
   p->loose = PETSC_FALSE;
-  p->why[0] = '\0';
+  p->why[0] = m->loose[0] = '\0';
   PetscUseTypeMethod(m, solve, mu);
+  PetscCall(PetscStrncpy(p->free_motion, p->loose ? m->loose : "", sizeof(p->free_motion)));
   /* a path is reconstructed at its listed times */
   if (m->ops->reconstruct && m->reconstruct && p->reason > 0 && !m->model->scene->n_times)
     HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));

@@ -130,7 +130,7 @@ static PetscErrorCode DestroyModel(HycoROM rom)
   PetscCall(HycoMeshDestroy(&m->mesh));
   HycoDestroyAll(&m->scene, &m->rid, &m->inside);
   HycoFreeAll(&m->master_reach, &m->facet, &m->in_rid, &m->closed, &m->V, &m->V_whole, &m->sigma, &m->fe_dof,
-              &m->points, &m->reach, &m->provenance, &m->search, &rom->model);
+              &m->points, &m->stops, &m->reach, &m->provenance, &m->search, &rom->model);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -193,7 +193,7 @@ static PetscErrorCode LoadHeldOut(HycoH5 h, HycoROM m)
   for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) {
     t->median[e] = numbers[1 + e];
     t->largest[e] = numbers[1 + HYCO_N_ESTIMATES + e];
-    good = (PetscBool)(good && t->median[e] >= 0 && t->largest[e] >= t->median[e]);
+    good = (PetscBool)(good && t->median[e] >= -1 && t->largest[e] >= t->median[e]);
   }
   PetscCall(PetscFree(numbers));
   HycoCheck(good, "%s: training/held_out is damaged", m->model->path);
@@ -464,6 +464,15 @@ static PetscErrorCode MoveProblem(HycoH5 h, HycoROM m)
   PetscCall(MoveType(h, m));
   PetscCall(HycoH5Real(h, "training/points", &m->model->n_points, m->model->scene->n_parameters, &m->model->points));
   PetscCall(HycoH5Reals(h, "training/numbers", 3, m->model->numbers));
+  /* None in models of earlier versions. */
+  if (HycoH5Reads(h) ? HycoH5Has(h, "training/time_error") : m->model->time_error > 0) {
+    if (HycoH5Reads(h)) m->model->n_stops = -1;
+    PetscCall(HycoH5Reals(h, "training/time_error", 1, &m->model->time_error));
+    if (HycoH5Reads(h) ? HycoH5Has(h, "training/stops") : m->model->n_stops > 0)
+      PetscCall(HycoH5Real(h, "training/stops", &m->model->n_stops, 1, &m->model->stops));
+    else
+      m->model->n_stops = 0;
+  }
   if (HycoH5Reads(h) ? HycoH5Has(h, "training/closed") : m->model->closed != NULL)
     PetscCall(HycoH5Int(h, "training/closed", 0, 1, &m->model->pairs.n, 1, &m->model->closed));
   PetscCall(MoveEstimates(h, m));

@@ -176,6 +176,8 @@ PetscErrorCode HycoTraceFollow(HycoROM m, HycoPath p, const PetscReal mu[])
   out->reason = HYCO_CONVERGED; /* unless a listed time changes it */
   p->n_given = m->trace.n_given;
   p->given = m->trace.given;
+  p->n_stops = m->model->n_stops;
+  p->stops = m->model->stops;
   p->most_cuts = m->trace.most_cuts;
   /* A prediction must not depend on the path before it. */
   p->cold = PETSC_TRUE;
@@ -187,6 +189,7 @@ PetscErrorCode HycoTraceFollow(HycoROM m, HycoPath p, const PetscReal mu[])
   PetscCall(ierr);
   m->trace.n_cuts = p->n_cuts;
   HycoPathGetHistory(p, &m->trace.history);
+  if (p->n_stops && !p->substeps && p->time_tol > 0) m->trace.history.time_error = m->model->time_error;
   Summarise(p, out);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,5 +1,7 @@
 """Scenes with friction: every type of contact, bodies that friction alone holds, creep, several ranks, interrupted runs, mu = 0, refusals.
 Closed forms are in tests/verify/friction.py, random scenes in friction_random.py."""
+import csv
+import json
 import os
 import shutil
 import signal
@@ -40,6 +42,26 @@ force: {block: {x: 0, y: "-t"}}
 contact: {plane: {group: base, normal: {x: "sin(0.3)", y: "-cos(0.3)"}, gap: 0, friction: "MU"}}
 history: {times: [0, 1, 2]}
 output: {N: {force: y, contact: plane}, T: {friction: x, contact: plane}}
+"""
+SPRUNG = """
+scene: {mesh: mesh.msh, parameters: [k]}
+parameter: {k: {range: [0, 10]}}
+body: {block: {young: 7e4, poisson: 0.33}}
+pressure: {top: 10*bolt}
+traction: {end: {x: 2*mill, y: mill}}
+spring: {end: {x: k, y: k}}
+contact: {floor: {type: obstacle, group: base, normal: {z: -1}, gap: 0, friction: 0.3}}
+history: {times: [0, 0.5, 1, 1.5, 2], tables: {bolt: [[0, 0], [1, 1]], mill: [[1, 0], [2, 1]]}}
+output: {N: {force: z, contact: floor}, T: {friction: x, contact: floor}, move: {mean: u_x, group: end}}
+"""
+WIDENS = """
+scene: {mesh: mesh.msh, parameters: [p]}
+parameter: {p: {range: [5, 10]}}
+body: {block: {young: 1000, poisson: 0.3}}
+pressure: {top: p*t}
+contact: {floor: {type: obstacle, group: base, normal: {y: -1}, gap: 0, friction: 0.1}}
+history: {times: [0, 1, 2]}
+output: {move: {mean: u_x, group: top}, N: {force: y, contact: floor}}
 """
 UNLOADED = """
 scene: {mesh: mesh.msh}
@@ -143,6 +165,48 @@ class Friction(Case):
         self.assertEqual(run.returncode, 1)
         self.assertIn('with this friction', run.stderr)
         self.assertIn('body block from moving along (0.96, 0.3, 0)', run.stderr)  # the slope
+
+    def test_soft_springs(self):
+        """A block on springs down to 1e-13 of its stiffness, pressed and drawn: the path ends where it does without them."""
+        grid = Grid()
+        grid.box('hex8', [np.linspace(0, 30, 2), np.linspace(0, 20, 2), np.linspace(0, 10, 2)], lambda x: x, 'block', {'z0': 'base', 'z1': 'top', 'x1': 'end'})
+        self.written(SPRUNG, grid)
+        free = self.hyco('solve', '-scene', 'scene.yaml', '-mu', '0')['outputs']
+        for k in ('1e-8', '1e-6', '1e-5', '1e-4', '1e-2'):
+            found = self.hyco('solve', '-scene', 'scene.yaml', '-mu', k)
+            self.assertTrue(found['converged'])
+            self.assertLess(max(found['history']['kkt_max']), 1e-10, k)
+            for name, value in free.items():
+                self.near(found['outputs'][name], value, 1e-4, name)
+
+    def test_arbitrary(self):
+        """A block all of whose contacts slip as it widens: body, direction and times of the motion that none holds, alike from full order and a model;
+        displacements are not compared: NaN in tables, null in reports."""
+        grid = Grid()
+        grid.box('quad4', [np.linspace(0, 1, 2)] * 2, lambda x: x, 'block', {'y0': 'base', 'y1': 'top'})
+        self.written(WIDENS, grid)
+        lines = []
+        for args in (('solve', '-scene', 'scene.yaml'), ('predict', '-model', 'wide.h5'), ('compare', '-scene', 'scene.yaml', '-model', 'wide.h5')):
+            if args[0] == 'predict':
+                report = self.hyco('train', '-scene', 'scene.yaml', '-grid', '3', '-model', 'wide.h5', '-hyco_validation', '12')
+                self.assertIsNone(report['held_out']['u']['largest'])
+                self.assertIsNone(report['held_out']['outputs']['move']['largest'])
+                self.assertLess(report['held_out']['outputs']['N']['largest'], 1e-8)
+            run = self.run_raw(*args, '-mu', '7', '-report', self.path('wide.json'), '-table', self.path('wide.csv'))
+            self.assertEqual(run.returncode, 0, run.stderr)
+            lines.append([line for line in run.stdout.splitlines() if 'body block from moving along (1, 0, 0) (t = 1 to 2)' in line])
+            with open(self.path('wide.json'), encoding='utf-8') as f:
+                report = json.load(f)
+            if args[0] == 'compare':
+                self.assertEqual((report['worst_u']['not_compared'], report['worst_u']['max'], report['worst_output_move']['max']), (1, None, None))
+                self.assertLess(report['worst_lambda']['max'], 1e-8)
+                with open(self.path('wide.csv'), encoding='utf-8') as f:
+                    row = next(csv.DictReader(f))
+                self.assertEqual((row['worst_u'], row['worst_output_move']), ('nan', 'nan'))
+            else:
+                self.assertEqual((report['position_arbitrary'], report['loose']), (True, 'body block from moving along (1, 0, 0) (t = 1 to 2)'))
+        self.assertEqual([len(line) for line in lines], [1, 1, 1])
+        self.assertEqual(lines[0], lines[1])
 
     def test_unloaded(self):
         """The block that friction holds, with its load taken away and applied again: no forces at the time without a load. So a block that a lid

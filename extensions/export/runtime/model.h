@@ -67,6 +67,7 @@ typedef struct {
   int n_contacts, n_blocks;  /* n_places contacts, and no blocks, unless surfaces move */
   int areas;                 /* of contacts: the first of their values, unless surfaces move */
   int n_slip, n_tables;      /* blocks of contacts with friction, with the others; tables of a history */
+  int n_stops;               /* times at which steps end as well */
   double tolerance, least;   /* of the KKT residual; the smallest step in time */
   DATA double *code;         /* expressions */
   DATA int *atom, *function; /* the expressions of the parameters, in code; n_functions x 4: see product() */
@@ -84,7 +85,7 @@ typedef struct {
   DATA int *row, *coefficient; /* by block: its first row, with the end; the value that is its coefficient, -1: 0 */
   DATA int *normal;            /* by row: it is one; NULL: all are */
   DATA int *table;             /* by table: its first row, with the end; rows: */
-  DATA double *table_t, *table_value;
+  DATA double *table_t, *table_value, *stop;
   /* Bodies that flow: their modes; points with laws, those whose increments bound a step, those that give alpha, each part of
      the one before; components of their strains, which are the first values, point by point; what follows. */
   int n_modes, n_points, n_settled, n_chosen, n_strain, n_flowing, n_lost, newton_most;

@@ -516,6 +516,9 @@ static int advance(const Model *m, Work *o, const double mu[], double t, double 
     for (int i = 0; i < (m->n_tables ? m->table[m->n_tables] : 0); i++) {
       if (m->table_t[i] > now) stop = fmin(stop, m->table_t[i]);
     }
+    for (int i = 0; i < m->n_stops; i++) {
+      if (m->stop[i] > now) stop = fmin(stop, m->stop[i]);
+    }
     n = ceil((stop - now) / dt - 1e-9);
     h = n > 1 ? (stop - now) / n : stop - now;
     to = n > 1 ? now + h : stop;

@@ -10,6 +10,7 @@
   alpha, whose derivative dr / dalpha Newton's method on alpha needs (bodies_newton.c).
 */
 #include "bodies_friction.h"
+#include <hycopath.h>
 #include <hycoalgorithms.h>
 #include <hycolcp.h>
 
@@ -450,47 +451,37 @@ PetscErrorCode HycoBodiesFrictionDerive(HycoBodiesFriction f, PetscInt m, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define HOLDS 1e-10 /* share of the largest force below which a force holds nothing */
-#define EDGE  1e-6  /* of the tangential force: nearer to the border of the cone a contact slips */
-
-/* Whether the contacts with a force, and of these the tangents that stick, leave a rigid motion free: the slips of later states
-   begin from there. Without any force bodies stay where they are, but for what loads that balance themselves ask for. */
-static PetscErrorCode FindLoose(HycoBodiesFriction f, HycoBodiesWork o)
+/* Whether the contacts with a force, and of these the tangents that stick, leave a rigid motion free, which is named: the
+   slips of later states begin from there. Without any force bodies stay where they are, but for what loads that balance
+   themselves ask for. */
+static PetscErrorCode FindLoose(HycoBodiesFriction f, HycoBodiesWork o, PetscReal t)
 {
   const PetscInt p = f->p;
   const PetscReal *L = f->z + p;
-  PetscReal *A, *gram, *all, most = 0;
-  PetscBool held;
+  PetscReal *A, *first, most = 0;
+  PetscInt n;
 
   PetscFunctionBegin;
   if (!p) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt k = 0; k < f->slip.n; k++) most = PetscMax(most, L[f->slip.row[k]]);
   f->adrift = (PetscBool)(!(most > 0) && (f->adrift || HycoBodiesLoaded(o)));
   if (!(most > 0)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscCalloc3(p * f->all.n, &A, p * p, &gram, p, &all));
+  PetscCall(PetscMalloc2(p * f->all.n, &A, p, &first));
   MotionRows(f, A);
-  for (PetscInt k = 0; k < f->slip.n; k++) {
-    const PetscInt first = f->slip.row[k], end = f->slip.row[k + 1];
-    PetscReal shear = 0;
-
-    for (PetscInt r = first + 1; r < end; r++) shear += L[r] * L[r];
-    for (PetscInt r = first; r < end; r++) {
-      const PetscReal *a = A + r * p;
-      const PetscBool holds = (PetscBool)(L[first] > HOLDS * most &&
-                                          (r == first || PetscSqrtReal(shear) < (1 - EDGE) * f->slip.mu[k] * L[first]));
-
-      for (PetscInt i = 0; i < p; i++) all[i] += a[i] * a[i];
-      for (PetscInt i = 0; i < p * p && holds; i++) gram[i] += a[i / p] * a[i % p];
-    }
+  PetscCall(HycoBlocksLoose(f->blocks, p, A, L, &n, first));
+  if (n && !f->loose) {
+    PetscCall(HycoBodiesNameMotion(o, &f->all, L, first, f->name));
+    f->at[0] = t;
   }
-  PetscCall(HycoCholesky("U", p, gram, all, &held));
-  f->loose = (PetscBool)(f->loose || !held);
-  PetscCall(PetscFree3(A, gram, all));
+  if (n) f->at[1] = t;
+  f->loose = (PetscBool)(f->loose || n);
+  PetscCall(PetscFree2(A, first));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscBool HycoBodiesFrictionLoose(HycoBodiesFriction f)
+PetscBool HycoBodiesFrictionLoose(HycoBodiesFriction f, char name[HYCO_LINE])
 {
+  if (f->loose && name) HycoPathNameTimes(f->name, f->at, name);
   return (PetscBool)(f->loose || f->adrift);
 }
 
@@ -501,7 +492,7 @@ PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction f, HycoBodiesWork o, 
   const size_t n = (size_t)(f->p + f->all.n);
 
   PetscFunctionBegin;
-  PetscCall(FindLoose(f, o));
+  PetscCall(FindLoose(f, o, t));
   if (f->n_taken == f->room) {
     f->room = 2 * f->room + 64;
     PetscCall(PetscRealloc((size_t)f->room * n * sizeof(PetscReal) + 1, &f->taken));

@@ -27,6 +27,8 @@ struct _n_HycoBodiesFriction {
   PetscInt n_taken, room;        /* accepted steps, and room for them */
   PetscBool loose;               /* an accepted state with forces left a motion free */
   PetscBool adrift;              /* the last one has no forces, but loads */
+  char name[HYCO_LINE];          /* loose: the first motion that was free, with its first and last time */
+  PetscReal at[2];
   PetscReal *taken;              /* by accepted step: p + rows, its motions and forces */
   HycoBodiesAlong along;         /* NULL: no derivatives have been asked for; bodies_along.c frees it */
 };

@@ -234,9 +234,16 @@ static PetscErrorCode Record(HycoPath p)
   if (w->friction) PetscCall(RecordFriction(m, &p->now));
   loose = &m->trace.loose[m->trace.n_listed - 1];
   if (w->friction)
-    *loose = HycoBodiesFrictionLoose(w->friction);
-  else if (p->now.total_contact_force > 0 || HycoBodiesLoaded(&w->bodies))
+    *loose = HycoBodiesFrictionLoose(w->friction, m->loose);
+  else if (p->now.total_contact_force > 0 || HycoBodiesLoaded(&w->bodies)) {
+    char name[HYCO_LINE];
+
     PetscCall(HycoBodiesLoose(&w->bodies, w->surface.n, m->Lambda, loose));
+    if (*loose && !m->prediction.loose) p->loose_at[0] = p->t;
+    p->loose_at[1] = p->t;
+    HycoBodiesNameFloating(&w->bodies, m->model->scene, name);
+    if (*loose) HycoPathNameTimes(name, p->loose_at, m->loose);
+  }
   m->prediction.loose = (PetscBool)(m->prediction.loose || *loose);
   PetscCall(HycoRowsCountDependent(rows, m->fe->n_dof, m->U, m->Lambda,
                                    w->friction ? HycoBodiesFrictionSlip(w->friction) : NULL, &p->now.n_dependent));
