@@ -31,6 +31,9 @@ PetscErrorCode HycoInterruptCheck(void);
 
 /* Fails for NULL and for an object of another class. Not collective. `classid` is one of HYCO_..._CLASSID. */
 PetscErrorCode HycoHandleCheck(const void *handle, const PetscClassId *classid, const char function[]);
+/* An address that a caller must give. */
+#define HycoCheckGiven(pointer)                                                                                        \
+  PetscCheck((pointer), PETSC_COMM_SELF, PETSC_ERR_ARG_NULL, "%s: the argument " #pointer " is NULL", PETSC_FUNCTION_NAME)
 #define HycoCheckHandle(handle, classid) PetscCall(HycoHandleCheck((handle), &(classid), PETSC_FUNCTION_NAME))
 /* Begins a View: checks the object; `viewer` becomes stdout if it is NULL; on an ASCII viewer prints the object's class
    and name, and pushes a tab, which the caller pops; with another viewer returns from the calling function. */
@@ -42,13 +45,16 @@ PetscErrorCode HycoHandleCheck(const void *handle, const PetscClassId *classid, 
     if (!ascii_) PetscFunctionReturn(PETSC_SUCCESS);                                                                   \
   } while (0)
 PetscErrorCode HycoViewBegin_Private(PetscObject object, PetscViewer *viewer, PetscBool *ascii);
+PetscErrorCode HycoViewFromOptions_Private(PetscObject object, PetscObject owner, const char option[]);
+/* Gives an object another's options and prefix: what is inside an object reads what the object does. */
+PetscErrorCode HycoOptionsInherit(PetscObject object, PetscObject from);
 /* Defines XViewFromOptions() of a class. */
 #define HycoDefineViewFromOptions(Class, classid)                                                                      \
   PetscErrorCode Class##ViewFromOptions(Class object, PetscObject owner, const char option[])                          \
   {                                                                                                                    \
     PetscFunctionBegin;                                                                                                \
     HycoCheckHandle(object, classid);                                                                                  \
-    PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));                                         \
+    PetscCall(HycoViewFromOptions_Private((PetscObject)object, owner, option));                                        \
     PetscFunctionReturn(PETSC_SUCCESS);                                                                                \
   }
 /* Defines a method of a class that executes statements once the handle is checked, for setters and getters. */
@@ -199,6 +205,9 @@ PetscErrorCode HycoOptionsForgetTable(void);
    the table. */
 PetscErrorCode HycoDeclareClasses(PetscOptions options);
 void HycoOptionsSetDeclare(PetscErrorCode (*declare)(PetscOptions));
+/* Makes each kind of object that reads options of a prefix of hyco's solvers read the global ones, one after the other (src/package). */
+void HycoOptionsSetProbe(PetscErrorCode (*probe)(const char name[]));
+PetscErrorCode HycoSolversProbe(const char name[]);
 /* Registers the ids of all classes; sets them to 0, after PetscFinalize(); fails before the first. Not collective. */
 PetscErrorCode HycoClassesRegister(void);
 PetscErrorCode HycoClassesForget(void);

@@ -221,6 +221,8 @@ enum {
   HYCO_TAO_CONES = 128     /* solves with blocks of any cone; the others know z >= 0 only */
 };
 int HycoTaoTraits(const char type[]);
+/* The error of the last solve by a type of TAO's, "": none. Of the process. */
+const char *HycoTaoFailure(void);
 /* The type's registered name, empty for an unknown one; list: TAO's types that are suitable for contact. */
 PetscErrorCode HycoTaoFindType(const char type[], char name[HYCO_TAO_NAME], char list[HYCO_LINE]);
 

@@ -185,6 +185,7 @@ enum { HYCO_UNIT_LENGTH, HYCO_UNIT_FORCE, HYCO_UNIT_STRESS, HYCO_N_UNITS };
 struct _p_HycoScene {
   PETSCHEADER(int);
   PetscOptions options;                         /* every entry, those of the command line included */
+  PetscBool *shared; /* by entry: an option of PETSc's solvers, which is in the global options while the scene exists */
   char *title, *mesh_path, *unit[HYCO_N_UNITS]; /* units: notes, "" where the scene has none */
   DM dm;                                        /* the mesh of a calling program; NULL: mesh_path */
   PetscBool face_nodes;                         /* rank 0, once the mesh is read: its hex20 cells are read as hex27 */
@@ -266,6 +267,8 @@ PetscErrorCode HycoSceneCompareHistory(HycoScene scene, const char made[], const
 PetscBool HycoIsVariableName(const char word[]);
 
 /* Builds a scene from n (key, value) entries; `folder`: folder of a relative mesh path. */
+/* Gives an object the scene's options, with what the global ones say now, and its prefix. Not collective. */
+PetscErrorCode HycoSceneGiveOptions(HycoScene scene, PetscObject object);
 PetscErrorCode HycoSceneFromEntries(MPI_Comm comm, PetscInt n, char *const key[], char *const value[],
                                     const char folder[], HycoScene *scene);
 /* The entries as text, one "key\tvalue" per line, and back. The caller frees the text. */

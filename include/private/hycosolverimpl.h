@@ -131,6 +131,7 @@ struct _p_HycoSolver {
   PetscInt its;
   PetscInt sign; /* with cones: of the determinant of the derivative at the solution; 0: not known */
   PetscInt linear_its, linear_solves, linear_most; /* of conjugate gradients: iterations, solves, most in one solve */
+  char failure[HYCO_LINE]; /* what a solver of PETSc says why it failed in the last solve; "": nothing */
   char method[128];
   PetscReal seconds_factor, seconds_solve, seconds_before; /* before: time of a factor computed ahead of the solve */
 };
@@ -150,6 +151,10 @@ PetscErrorCode HycoSolverFormCreate_Flexibility(HycoSolver s, HycoSolverForm for
 HycoSolverForm HycoSolverFindForm(HycoSolver s, const char name[]);
 /* The cheapest form that accepts the system with the current method; `stay` is preferred if it accepts. NULL: none,
    and the reason. */
+/* Notes that a KSP of the last solve has not converged, with its reason. */
+PetscErrorCode HycoSolverNoteKSP(HycoSolver s, KSP ksp);
+/* HycoReasonName() of a reason below 0, and what PETSc's solver says. */
+void HycoSolverExplain(HycoSolver s, char why[HYCO_LINE]);
 PetscErrorCode HycoSolverAcceptingForm(HycoSolver s, HycoSolverForm stay, HycoSolverForm *form, char why[HYCO_LINE]);
 /* Writes the method into s->method: "active_set dual", "tao gpcg dual". */
 PetscErrorCode HycoSolverNameMethod(HycoSolver s, const char form[]);

@@ -42,4 +42,7 @@ struct _n_HycoTao {
    the active set. Collective. */
 PetscErrorCode HycoTaoNewton(Tao tao, PetscBool lemke);
 
+/* Gives the Tao's KSP its prefix: after the Tao's own prefix and type. */
+PetscErrorCode HycoTaoSetKSPPrefix(Tao tao);
+
 #endif

@@ -435,9 +435,16 @@ def _check_options(entries):
     for name in entries:
         if not name.startswith(tuple(f'{section}_' for section in SECTIONS)):
             raise WrongValue(f'{name} is not an entry of a scene; these begin with {", ".join(f"{section}_" for section in SECTIONS)}')
-        if name.startswith('hyco_') and name.encode() not in known:
+        if name.startswith('hyco_') and name.encode() not in known and not _of_solver(name):
             near = c.lib.HycoNearest(name.encode(), c.count(len(known)), (ctypes.c_char_p * len(known))(*known))
             raise WrongValue(f'there is no option {name}' + (f'; did you mean {near.decode()}?' if near else ' (hyco train -help lists them)'))
+
+
+def _of_solver(name):
+    """Whether one of PETSc's solvers in the library reads the option."""
+    prefix, reads = ctypes.c_int(), ctypes.c_int()
+    c.call('HycoOptionsOfSolver', name.encode(), ctypes.byref(prefix), ctypes.byref(reads))
+    return bool(reads.value)
 
 
 def _where(mu, parameters):

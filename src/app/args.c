@@ -5,32 +5,23 @@
 #include <string.h>
 #include <strings.h>
 
-/* Options of PETSc, SLEPc and the solvers: recognised by their prefix, checked by the code that reads them; first
-   those of the solvers that hyco creates. */
-#define OWN_SOLVERS                                                                                                    \
-  "hyco_mumps_", "hyco_primal_", "hyco_norm_", "hyco_tao_", "hyco_pod_svd_", "hyco_pod_bv_", "hyco_pod_ds_"
-static const char *const own_solvers[] = {OWN_SOLVERS, NULL};
-static const char *const foreign[] = {OWN_SOLVERS,
-                                      "log_",
+/* Options of PETSc and SLEPc: recognised by their beginning, checked by the code that reads them. */
+static const char *const foreign[] = {"log_",
                                       "info",
                                       "malloc",
                                       "memory_view",
+                                      "objects_",
                                       "options_",
+                                      "prefix_",
                                       "mat_",
                                       "vec_",
-                                      "ksp_",
-                                      "pc_",
-                                      "bv_",
-                                      "svd_",
-                                      "st_",
-                                      "ds_",
-                                      "tao_",
                                       "on_error_",
                                       "start_in_debugger",
                                       "stop_for_debugger",
                                       "fp_trap",
                                       "error_output",
                                       "check_pointer",
+                                      "get_total_flops",
                                       "nox",
                                       "viewer_",
                                       "citations",
@@ -40,6 +31,19 @@ static const char *const foreign[] = {OWN_SOLVERS,
                                       "petsc_",
                                       "device_",
                                       NULL};
+/* Those of them that PETSc reads at its end. */
+static const char *const at_end[] = {"options_", "citations", "malloc",   "objects_",        "log_", "memory_view",
+                                     "nox",      "skip_",     "on_error", "get_total_flops", NULL};
+/* Of objects that have a prefix in hyco. */
+static const struct {
+  const char *beginning, *with;
+} prefixed[] = {{"ksp_", "-hyco_primal_ or -hyco_tao_"},
+                {"pc_", "-hyco_primal_ or -hyco_tao_"},
+                {"tao_", "-hyco_"},
+                {"svd_", "-hyco_pod_"},
+                {"bv_", "-hyco_pod_"},
+                {"ds_", "-hyco_pod_"},
+                {"st_", "-hyco_pod_"}};
 
 /* PETSc compares names of options without regard to case. PETSc's own objects have options by prefix, which no table
    lists. */
@@ -126,9 +130,23 @@ static PetscErrorCode CheckName(const Command *command, const HycoOptionList *ow
                                 const char previous[])
 {
   const HycoOption *option = HycoOptionFind(name);
+  PetscBool solvers, reads;
 
   PetscFunctionBegin;
   if (option) PetscCall(CheckReaders(command, option));
+  if (!option) {
+    PetscCall(HycoOptionsOfSolver(name, &solvers, &reads));
+    HycoCheck(!solvers || reads,
+              "the option %s has no effect: no solver in hyco reads it; docs/petsc.md lists their prefixes", word);
+    HycoCheck(!solvers || strncasecmp(name, "hyco_pod_", 9) || !strcmp(command->name, "train"),
+              "hyco %s does not use %s; this command does: hyco train", command->name, word);
+    if (solvers) PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (size_t k = 0; k < sizeof(prefixed) / sizeof(prefixed[0]); k++) {
+    if (strncasecmp(name, prefixed[k].beginning, strlen(prefixed[k].beginning))) continue;
+    HycoFail("the option %s has no effect: hyco's solvers have prefixes, %s in place of the dash (docs/petsc.md)", word,
+             prefixed[k].with);
+  }
   if (option || HycoOptionListFind(own, name) || BeginsAs(foreign, name) ||
       (IsSceneEntry(name) && HycoOptionListFind(own, "scene")))
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -145,15 +163,31 @@ static PetscErrorCode CheckName(const Command *command, const HycoOptionList *ow
 PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **argv)
 {
   HycoOptionList own = {0};
+  char prefix[DRIVER_LINE] = "", full[2 * DRIVER_LINE];
+  size_t end[8] = {0};
+  PetscInt depth = 0;
 
   PetscFunctionBegin;
   PetscCall(HycoOptionsRecord(&own, command->declare));
   for (int k = 2; k < argc; k++) {
+    const char *name = argv[k] + (argv[k][1] == '-' ? 2 : 1);
+
     if (!IsKey(argv[k]))
       HycoFail("\"%s\" is not an option; options begin with a dash and take one value (separate several numbers by "
                "commas, without spaces)",
                argv[k]);
-    PetscCall(CheckName(command, &own, argv[k] + (argv[k][1] == '-' ? 2 : 1), argv[k], k > 2 ? argv[k - 1] : NULL));
+    /* As PETSc does: up to 5 prefixes for what follows. */
+    if (strcasecmp(name, "prefix_push") == 0 && k + 1 < argc && depth < 7) {
+      end[++depth] = strlen(prefix) + strlen(argv[k + 1]);
+      PetscCall(PetscStrlcat(prefix, argv[++k], sizeof(prefix)));
+      continue;
+    }
+    if (strcasecmp(name, "prefix_pop") == 0 && depth) {
+      prefix[end[--depth]] = '\0';
+      continue;
+    }
+    snprintf(full, sizeof(full), "-%s%s", prefix, name);
+    PetscCall(CheckName(command, &own, full + 1, prefix[0] ? full : argv[k], k > 2 && !prefix[0] ? argv[k - 1] : NULL));
     /* The value, which is not checked here. */
     if (k + 1 < argc && !IsKey(argv[k + 1])) k++;
   }
@@ -178,29 +212,62 @@ PetscErrorCode DriverRefuseOnly(const char only[], const char reason[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Options that a solver reads when it runs; an SVD has then read all except those that show its result. */
-static PetscBool IsReadLate(const char name[])
+/* Options of the command line and of the files that it names: others, of ~/.petscrc and PETSC_OPTIONS, are for all programs. */
+static PetscErrorCode CreateGiven(PetscOptions *given)
 {
-  const PetscBool shows = (PetscBool)(strstr(name, "view") || strstr(name, "reason") || strstr(name, "error"));
+  int argc;
+  char **argv;
 
-  return (PetscBool)(BeginsAs(own_solvers, name) && (shows || strncasecmp(name, "hyco_pod_", 9)));
+  PetscFunctionBegin;
+  PetscCall(PetscGetArgs(&argc, &argv));
+  PetscCall(PetscOptionsCreate(given));
+  PetscCall(PetscOptionsInsertArgs(*given, argc - 1, argv + 1));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An option that nobody has read is a typing error or has no effect here; both would go unnoticed. */
+/* Whether it is an error that this rank has not read an option. Early: what solvers read with the first solve counts as read. */
+static PetscErrorCode IsMissed(const char name[], PetscOptions given, PetscBool early, PetscBool *missed)
+{
+  char dashed[2 * DRIVER_LINE];
+  PetscBool solvers, reads, mine;
+
+  PetscFunctionBegin;
+  PetscCall(HycoOptionsOfSolver(name, &solvers, &reads));
+  snprintf(dashed, sizeof(dashed), "-%s", name);
+  PetscCall(PetscOptionsHasName(given, NULL, dashed, &mine));
+  *missed = (PetscBool)(mine && !BeginsAs(at_end, name) && !(early && solvers && reads && !strstr(name, "_pod_")));
+  /* A name of hyco's that nothing has is a typing error anywhere. */
+  if (!mine && strncasecmp(name, "hyco_", 5) == 0) *missed = (PetscBool)(!reads && !HycoOptionFind(name));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* An option that no rank has read is a typing error or has no effect here; both would go unnoticed. The ranks' options are the same. */
 static PetscErrorCode CheckLeft(PetscBool early)
 {
   PetscInt n;
-  char **names, **values, first[DRIVER_LINE] = "";
+  PetscOptions given;
+  char **names, **values, all[DRIVER_LINE], first[DRIVER_LINE] = "";
 
   PetscFunctionBegin;
+  PetscCall(CreateGiven(&given));
   PetscCall(PetscOptionsLeftGet(NULL, &n, &names, &values));
-  for (PetscInt k = 0; k < n && !first[0]; k++) {
-    /* Early: options of the solvers are read with the first solve, and count as read here. */
-    if (early && IsReadLate(names[k])) continue;
-    if (strncmp(names[k], "options_left", 12) && strncmp(names[k], "skip_petscrc", 12) && strcmp(names[k], "nox"))
-      PetscCall(PetscStrncpy(first, names[k], sizeof(first)));
+  for (PetscInt k = 0, most = n; !first[0]; k++) {
+    PetscBool missed = PETSC_FALSE, shows;
+
+    HycoBcast(&most, 1, MPIU_INT, PETSC_COMM_WORLD);
+    if (k >= most) break;
+    all[0] = '\0';
+    if (HycoRank(PETSC_COMM_WORLD) == 0) PetscCall(PetscStrncpy(all, names[k], sizeof(all)));
+    HycoBcast(all, DRIVER_LINE, MPI_CHAR, PETSC_COMM_WORLD);
+    shows = (PetscBool)(strstr(all, "view") || strstr(all, "reason") || strstr(all, "error"));
+    for (PetscInt l = 0; l < n && !missed; l++) {
+      if (strcasecmp(names[l], all) == 0 && !(early && shows)) PetscCall(IsMissed(all, given, early, &missed));
+    }
+    HycoAllreduce(&missed, 1, HYCO_MPI_BOOL, MPI_LAND, PETSC_COMM_WORLD);
+    if (missed) PetscCall(PetscStrncpy(first, all, sizeof(first)));
   }
   PetscCall(PetscOptionsLeftRestore(NULL, &n, &names, &values));
+  PetscCall(PetscOptionsDestroy(&given));
   HycoCheck(!first[0], "the option -%s has no effect in this command; remove it, or see hyco -help", first);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -353,7 +353,6 @@ PetscErrorCode CommandFit(void)
   PetscCall(DriverCheckLeftEarly());
   HycoStaged(HYCO_STAGE_ONLINE, RunOnEach(&f, &s));
   if (scene) HycoStaged(HYCO_STAGE_FULL_ORDER, Check(&f, scene, at, f.mu, full));
-  PetscCall(DriverCheckLeft());
   /* Last, since it may end in a miss: the answer is complete by then. */
   PetscCall(Report(&f, s.held, scene ? full : NULL));
   PetscCall(HycoSceneDestroy(&scene));

@@ -194,8 +194,7 @@ static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[], 
   PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
   /* A path's steps depend on each other: one rank computes it. */
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMPredict(model, n, mu));
-  /* Here, since the prediction has read the last options. */
-  PetscCall(DriverCheckLeft());
+  PetscCall(DriverCheckLeftEarly());
   PetscCall(DriverGetReducedPath(model, &path));
   /* Not even one step: there is nothing to write. */
   HycoCheck(path.n, "no prediction: %s; nothing was written", path.why);
@@ -439,7 +438,6 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
           "one full-order solve with these forces: displacements of the whole mesh, residuals of full order\n"));
     }
   }
-  PetscCall(DriverCheckLeft());
   HycoCheck(p.reason > 0, "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written",
             p.why[0] ? p.why : HycoReasonName(p.reason), (double)p.kkt.stationarity, (double)p.kkt.penetration,
             (double)p.kkt.adhesion, (double)p.kkt.complementarity);

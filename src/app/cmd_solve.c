@@ -134,7 +134,7 @@ static PetscErrorCode Path(HycoFOM fom, HycoScene scene, const PetscReal mu[], c
                            PetscBool derives)
 {
   HycoSummary summary;
-  DriverPath path = {.checked = PETSC_FALSE};
+  DriverPath path = {0};
   HycoGradient gradient;
   PetscInt n;
 
@@ -315,7 +315,6 @@ static PetscErrorCode One(HycoFOM fom, HycoScene scene, const PetscReal mu[], co
   PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
   PetscCall(HycoFOMSolve(fom, n, mu));
   PetscCall(HycoFOMGetSummary(fom, &summary));
-  PetscCall(DriverCheckLeft());
   HycoCheck(summary.reason > 0, "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written", summary.why,
             (double)summary.kkt.stationarity, (double)summary.kkt.penetration, (double)summary.kkt.adhesion,
             (double)summary.kkt.complementarity);
@@ -350,8 +349,6 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
 
     PetscCall(HycoFOMSolve(fom, n_par, mu + k * n_par));
     PetscCall(HycoFOMGetSummary(fom, &s));
-    /* Solvers read their options at the first solve. */
-    if (k == 0) PetscCall(DriverCheckLeft());
     if (s.loose[0] && !n_loose++) PetscCall(PetscStrncpy(loose, s.loose, sizeof(loose)));
     s.loose[0] = '\0'; /* of the set, below */
     if (k == 0) PetscCall(Remarks(&s, 0, NULL));
@@ -427,6 +424,7 @@ PetscErrorCode CommandSolve(void)
   PetscCall(HycoFOMGetSolver(fom, &solver));
   /* The handle is the FOM's: options have been read by its creation. */
   if (monitor) PetscCall(HycoSolverSetMonitor(solver, DriverMonitor, NULL));
+  PetscCall(DriverCheckLeftEarly());
   HycoStaged(HYCO_STAGE_FULL_ORDER, set       ? Many(fom, scene, samples, output, table, derives)
                                     : n_times ? Path(fom, scene, mu, output, table, derives)
                                               : One(fom, scene, mu, output, table, derives));

@@ -24,10 +24,9 @@ extern const Command commands[]; /* ends with name NULL */
 
 /* Checks that every option on the command line is known to `command`, or PETSc's, and that there are no other words. */
 PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **argv);
-/* Fails for options that were given but not read. To be called when all options have been read and before anything
-   is written. */
+/* Fails for options that were given on the command line, but that no rank has read: at the end of each command, when its results are written. */
 PetscErrorCode DriverCheckLeft(void);
-/* The same before the solvers have run: their options (-hyco_mumps_..., -hyco_tao_... with that type) are accepted. */
+/* The same before the solvers have run: options that one of them may read are accepted. */
 PetscErrorCode DriverCheckLeftEarly(void);
 /* Fails for an option on the command line that only such objects read (HycoOption.only), with the reason. */
 PetscErrorCode DriverRefuseOnly(const char only[], const char reason[]);
@@ -367,7 +366,6 @@ PetscErrorCode DriverReportSteps(cJSON *history, HycoScene scene, PetscBool redu
 /* The number of listed times of the scene; whether unread options have been checked. */
 typedef struct {
   PetscInt n;
-  PetscBool checked;
 } DriverPath;
 /* A HycoStepMonitor; ctx: a DriverPath. */
 PetscErrorCode DriverMonitorStep(HycoFOM fom, const HycoStep *step, void *ctx);

@@ -162,6 +162,8 @@ static PetscErrorCode Run(const Command *command, int argc, char **argv)
   PetscCall(DriverCheckOutputs(command));
   DriverProgressBegin();
   PetscCall(command->run());
+  /* A check of a scene makes no solver. */
+  PetscCall(command->run == CommandCheck ? DriverCheckLeftEarly() : DriverCheckLeft());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -222,6 +224,7 @@ static int Factors(const Command *command)
 int main(int argc, char **argv)
 {
   PetscErrorCode ierr;
+  PetscBool listed = PETSC_FALSE;
   int status;
 
   /* A line in one piece: glibc 2.37 and later write to an unbuffered stream in pieces of 128 bytes, which launchers and
@@ -243,7 +246,9 @@ int main(int argc, char **argv)
   PetscPopErrorHandler();
   if (ierr) Stop();
   fflush(stdout);
-  PetscOptionsSetValue(NULL, "-options_left", "0"); /* unread options have been checked before */
+  /* Unread options have been checked; as PETSc does if they are asked for. */
+  PetscOptionsHasName(NULL, NULL, "-options_left", &listed);
+  if (!listed) PetscOptionsSetValue(NULL, "-options_left", "0");
   status = DriverEndStatus(ierr);
   return HycoFinalize() ? DRIVER_FAILED : status;
 }

@@ -10,8 +10,6 @@ PetscErrorCode DriverMonitorStep(HycoFOM fom, const HycoStep *s, void *ctx)
 
   PetscFunctionBegin;
   (void)fom;
-  if (!path->checked) PetscCall(DriverCheckLeft()); /* the solvers have read their options */
-  path->checked = PETSC_TRUE;
   PetscCall(DriverPrintStep(s, path->n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

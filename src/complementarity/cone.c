@@ -10,6 +10,7 @@ HycoDefineRegister(HycoConeRegister, cones, PetscErrorCode (*create)(HycoCone))
 PetscErrorCode HycoConeCreate(MPI_Comm comm, HycoCone *cone)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(cone);
   PetscCall(HycoPackageCheck());
   PetscCall(PetscHeaderCreate(*cone, HYCO_CONE_CLASSID, "HycoCone", "Admissible contact forces", "Hyco", comm,
                               HycoConeDestroy, HycoConeView));
@@ -40,7 +41,8 @@ PetscErrorCode HycoConeSetSize(HycoCone cone, PetscInt size)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-HycoDefineMethod(HycoConeGetSize, (HycoCone cone, PetscInt *size), cone, HYCO_CONE_CLASSID, *size = cone->size)
+HycoDefineMethod(HycoConeGetSize, (HycoCone cone, PetscInt *size), cone, HYCO_CONE_CLASSID, HycoCheckGiven(size);
+                 *size = cone->size)
 
 /* Once for each cone: data and size of blocks that were made with it would no longer fit. */
 PetscErrorCode HycoConeSetType(HycoCone cone, HycoConeType type)
@@ -49,6 +51,7 @@ PetscErrorCode HycoConeSetType(HycoCone cone, HycoConeType type)
 
   PetscFunctionBegin;
   HycoCheckHandle(cone, HYCO_CONE_CLASSID);
+  HycoCheckGiven(type);
   PetscCheck(!((PetscObject)cone)->type_name, PETSC_COMM_SELF, PETSC_ERR_ORDER,
              "the cone has the type %s already; create another one", ((PetscObject)cone)->type_name);
   PetscCall(HycoRegistryFind(&cones, type, &create));
@@ -63,7 +66,7 @@ PetscErrorCode HycoConeSetType(HycoCone cone, HycoConeType type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-HycoDefineMethod(HycoConeGetType, (HycoCone cone, HycoConeType *type), cone, HYCO_CONE_CLASSID,
+HycoDefineMethod(HycoConeGetType, (HycoCone cone, HycoConeType *type), cone, HYCO_CONE_CLASSID, HycoCheckGiven(type);
                  *type = ((PetscObject)cone)->type_name)
 
 /* n_data: reals of each block, such as a coefficient of friction. For constructors of types. */
@@ -71,6 +74,7 @@ PetscErrorCode HycoConeSetOps(HycoCone cone, const struct _HycoConeOps *ops, Pet
 {
   PetscFunctionBegin;
   HycoCheckHandle(cone, HYCO_CONE_CLASSID);
+  HycoCheckGiven(ops);
   PetscCheck(ops->project && ops->derivative, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONGSTATE,
              "the cone %s must set project and derivative", ((PetscObject)cone)->type_name);
   PetscCheck(n_data >= 0, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "%d data of a block; it must be 0 or more",
@@ -81,7 +85,8 @@ PetscErrorCode HycoConeSetOps(HycoCone cone, const struct _HycoConeOps *ops, Pet
 }
 
 HycoDefineMethod(HycoConeSetData, (HycoCone cone, void *data), cone, HYCO_CONE_CLASSID, cone->data = data)
-HycoDefineMethod(HycoConeGetData, (HycoCone cone, void *data), cone, HYCO_CONE_CLASSID, *(void **)data = cone->data)
+HycoDefineMethod(HycoConeGetData, (HycoCone cone, void *data), cone, HYCO_CONE_CLASSID, HycoCheckGiven(data);
+                 *(void **)data = cone->data)
 
 /* Collective on the viewer. */
 PetscErrorCode HycoConeView(HycoCone cone, PetscViewer viewer)

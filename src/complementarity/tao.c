@@ -47,6 +47,8 @@ int HycoTaoTraits(const char type[])
 /* name: the type as TAO knows it, "" if it is unknown; list: the names for a message. */
 PetscErrorCode HycoTaoFindType(const char type[], char name[HYCO_TAO_NAME], char list[HYCO_LINE])
 {
+  static const char *const others[] = {"pounders", "brgn", "lcl",   "admm", "almm",
+                                       "pdipm",    "ipm",  "shell", "snes", "bmrm"};
   PetscErrorCode (*create)(Tao);
 
   PetscFunctionBegin;
@@ -57,6 +59,10 @@ PetscErrorCode HycoTaoFindType(const char type[], char name[HYCO_TAO_NAME], char
     if (strcasecmp(known[k].name, type) == 0) PetscCall(PetscStrncpy(name, known[k].name, HYCO_TAO_NAME));
     PetscCall(PetscStrlcat(list, list[0] ? ", " : "", HYCO_LINE));
     PetscCall(PetscStrlcat(list, known[k].name, HYCO_LINE));
+  }
+  /* Of TAO's others these need more than a bound problem has: some end the process. */
+  for (size_t k = 0; k < sizeof(others) / sizeof(others[0]); k++) {
+    if (strcasecmp(others[k], type) == 0) PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscFunctionListFind(TaoList, type, &create));
   /* A type that the program has registered. */
@@ -136,11 +142,12 @@ static PetscErrorCode Prepare(HycoTao t, Vec y, PetscInt max_its, PetscBool *mad
   t->n = n;
   t->N = N;
   PetscCall(TaoCreate(t->comm, &t->tao));
-  PetscCall(TaoSetType(t->tao, t->type));
   if (t->owner) PetscCall(PetscObjectGetOptionsPrefix(t->owner, &prefix));
   /* The owner's prefix first: several solvers in one program have options of their own. */
   PetscCall(PetscSNPrintf(t->prefix, sizeof(t->prefix), "%shyco_", prefix ? prefix : ""));
   PetscCall(TaoSetOptionsPrefix(t->tao, t->prefix));
+  PetscCall(TaoSetType(t->tao, t->type));
+  PetscCall(HycoTaoSetKSPPrefix(t->tao));
   if (t->traits & HYCO_TAO_OWN) { /* the form has its own solver on a set */
     t->tao->data = t;
     PetscCall(KSPDestroy(&t->tao->ksp));
@@ -160,8 +167,7 @@ static PetscErrorCode ReadOptions(HycoTao t)
   PetscCall(PetscSNPrintf(option, sizeof(option), "-%stao_type", t->prefix));
   PetscCall(PetscOptionsGetString(NULL, t->prefix, "-tao_type", named, sizeof(named), &given));
   if (given) PetscCall(PetscOptionsSetValue(NULL, option, t->type));
-  PetscCall(TaoSetFromOptions(t->tao));
-  if (given) PetscCall(PetscOptionsSetValue(NULL, option, named));
+  HycoFinally(TaoSetFromOptions(t->tao), if (given) PetscCall(PetscOptionsSetValue(NULL, option, named)));
   if (!t->quiet) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(TaoMonitorCancel(t->tao));
   t->tao->printreason = PETSC_FALSE;
@@ -315,7 +321,13 @@ static PetscErrorCode Run(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylov, Pe
     PetscCall(SetBoundProblem(t, krylov));
   else
     PetscCall(TaoSetHessian(t->tao, t->H, t->H, Hessian, NULL));
-  if (made) PetscCall(ReadOptions(t));
+  if (made) {
+    PetscErrorCode caught;
+    char said[HYCO_LINE];
+
+    HycoCatch(ReadOptions(t), caught, said);
+    if (caught) HycoFailAs(HYCO_ERR_VALUE, "an option -%stao_... is refused: %s", t->prefix, said);
+  }
   /* Stagnation is counted from here. */
   t->best = PETSC_MAX_REAL;
   t->best_at = 0;
@@ -361,6 +373,13 @@ static PetscErrorCode Scale(Mat H, Vec f, Vec lo, Vec hi, Vec y, Vec d, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static char failure[HYCO_LINE];
+
+const char *HycoTaoFailure(void)
+{
+  return failure;
+}
+
 /* One run of TAO from y; after an error inside it, sets *failed and destroys its Tao. y is finite at the end. TAO's
    errors are caught: a type may divide by zero or meet a singular matrix. A failed Tao is not used again. */
 static PetscErrorCode CatchRun(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylov, PetscInt *its, PetscBool *solved,
@@ -383,7 +402,8 @@ static PetscErrorCode CatchRun(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylo
     if (!caught) caught = more;
   }
   PetscCall(HycoCatchEnd(caught, message));
-  if (caught) PetscCall(PetscInfo(NULL, "TAO %s failed: %s\n", t->type, message));
+  if (caught == HYCO_ERR_VALUE) HycoFailAs(caught, "%s", message); /* the user's, not the problem's */
+  if (caught) HycoFormat(failure, "TAO's %s failed: %s", t->type, message);
   if (caught) *solved = PETSC_FALSE;
   *failed = (PetscBool)(caught != 0);
   PetscCall(VecNorm(y, NORM_2, &norm));
@@ -449,6 +469,7 @@ PetscErrorCode HycoTaoSolve(HycoTao t, Mat H, Vec f, Vec lo, Vec hi, Vec y, Pets
   t->F = f;
   PetscCall(VecDuplicate(y, &d));
   PetscCall(Scale(H, f, lo, hi, y, d, &size));
+  failure[0] = '\0';
   PetscCall(CatchRun(t, lo, hi, y, PETSC_FALSE, its, solved, &failed));
   /* An error inside TAO, as a factor of a singular Hessian: once more without factors. */
   if (failed) PetscCall(CatchRun(t, lo, hi, y, PETSC_TRUE, its, solved, &failed));

@@ -178,6 +178,22 @@ static PetscErrorCode SolveSemismooth(Tao tao)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* -..tao_ksp_, whose name TAO leaves to the type: without prefix for some; tao_bnk_ksp_, tao_bqnk_ksp_ of TAO's Newton types. */
+PetscErrorCode HycoTaoSetKSPPrefix(Tao tao)
+{
+  /* Not yet there while a type is made: one of hyco's. */
+  const char *type = ((PetscObject)tao)->type_name ? ((PetscObject)tao)->type_name : "";
+  const PetscBool quasi = (PetscBool)!strncmp(type, "bqnk", 4);
+
+  PetscFunctionBegin;
+  if (!tao->ksp) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(KSPSetOptionsPrefix(tao->ksp, ((PetscObject)tao)->prefix));
+  PetscCall(KSPAppendOptionsPrefix(tao->ksp, quasi                                              ? "tao_bqnk_"
+                                             : !strncmp(type, "bn", 2) && strcmp(type, TAOBNCG) ? "tao_bnk_"
+                                                                                                : "tao_"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The solver of the free unknowns' block: a factor, or -tao_ksp_type, -tao_pc_type. */
 static PetscErrorCode CreateKSP(Tao tao)
 {
@@ -188,8 +204,7 @@ static PetscErrorCode CreateKSP(Tao tao)
   PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)tao), &size));
   PetscCall(KSPCreate(PetscObjectComm((PetscObject)tao), &tao->ksp));
   PetscCall(PetscObjectIncrementTabLevel((PetscObject)tao->ksp, (PetscObject)tao, 1));
-  PetscCall(KSPSetOptionsPrefix(tao->ksp, ((PetscObject)tao)->prefix));
-  PetscCall(KSPAppendOptionsPrefix(tao->ksp, "tao_"));
+  PetscCall(HycoTaoSetKSPPrefix(tao));
   PetscCall(KSPSetType(tao->ksp, KSPPREONLY));
   PetscCall(KSPGetPC(tao->ksp, &pc));
   PetscCall(PCSetType(pc, PCLU));

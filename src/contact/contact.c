@@ -13,6 +13,7 @@ HycoDefineRegister(HycoContactRegister, types, PetscErrorCode (*create)(HycoCont
 PetscErrorCode HycoContactCreate(MPI_Comm comm, HycoContact *contact)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(contact);
   PetscCall(HycoPackageCheck());
   PetscCall(PetscHeaderCreate(*contact, HYCO_CONTACT_CLASSID, "HycoContact", "Contact discretisation", "Hyco", comm,
                               HycoContactDestroy, HycoContactView));
@@ -50,6 +51,7 @@ PetscErrorCode HycoContactSetType(HycoContact contact, HycoContactType type)
 
   PetscFunctionBegin;
   HycoCheckHandle(contact, HYCO_CONTACT_CLASSID);
+  HycoCheckGiven(type);
   PetscCall(HycoRegistryFind(&types, type, &create));
   if (!create) {
     char list[HYCO_LINE];
@@ -67,6 +69,7 @@ PetscErrorCode HycoContactSetType(HycoContact contact, HycoContactType type)
 }
 
 HycoDefineMethod(HycoContactGetType, (HycoContact contact, HycoContactType *type), contact, HYCO_CONTACT_CLASSID,
+                 HycoCheckGiven(type);
                  *type = ((PetscObject)contact)->type_name)
 
 PetscErrorCode HycoContactView(HycoContact contact, PetscViewer viewer)
@@ -88,6 +91,8 @@ PetscErrorCode HycoContactDeclare(HycoContact contact, const char name[], const 
 
   PetscFunctionBegin;
   HycoCheckHandle(contact, HYCO_CONTACT_CLASSID);
+  HycoCheckGiven(name);
+  HycoCheckGiven(title);
   PetscCall(HycoDeclaredAdd(&contact->entries, name, title, kind, required, &entry));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -105,10 +110,12 @@ PetscErrorCode HycoContactDeclareNormal(HycoContact contact)
 }
 
 HycoDefineMethod(HycoContactSetOps, (HycoContact contact, const struct _HycoContactOps *ops), contact,
-                 HYCO_CONTACT_CLASSID, *contact->ops = *ops)
+                 HYCO_CONTACT_CLASSID, HycoCheckGiven(ops);
+                 *contact->ops = *ops)
 HycoDefineMethod(HycoContactSetData, (HycoContact contact, void *data), contact, HYCO_CONTACT_CLASSID,
                  contact->data = data)
 HycoDefineMethod(HycoContactGetData, (HycoContact contact, void *data), contact, HYCO_CONTACT_CLASSID,
+                 HycoCheckGiven(data);
                  *(void **)data = contact->data)
 
 /* Values of a declared expression at n points, for types outside the library. */
@@ -119,6 +126,7 @@ PetscErrorCode HycoContactEvaluate(HycoContact contact, const char name[], const
 
   PetscFunctionBegin;
   HycoCheckHandle(contact, HYCO_CONTACT_CLASSID);
+  HycoCheckGiven(name);
   entry = HycoDeclaredFind(&contact->entries, name);
   HycoCheck(entry && entry->expr, "contact %s has no expression %s", contact->name, name);
   PetscCall(HycoExprEval(entry->expr, mu, n, x, value));
@@ -133,6 +141,8 @@ PetscErrorCode HycoContactGetLength(HycoContact contact, const char name[], Pets
 
   PetscFunctionBegin;
   HycoCheckHandle(contact, HYCO_CONTACT_CLASSID);
+  HycoCheckGiven(name);
+  HycoCheckGiven(length);
   entry = HycoDeclaredFind(&contact->entries, name);
   *length = entry && entry->kind == HYCO_ENTRY_LENGTH ? entry->value : -1;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -149,6 +149,41 @@ PetscErrorCode HycoEntriesList(HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Marked as read: a scene serves commands that have no such solver. */
+PetscErrorCode HycoEntriesShare(HycoScene scene)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(scene->n_entries + 1, &scene->shared));
+  for (PetscInt k = 0; k < scene->n_entries; k++) {
+    char dashed[HYCO_LINE];
+    PetscBool solvers, reads, set;
+
+    if (strncasecmp(scene->key[k], "hyco_", 5) || HycoOptionFind(scene->key[k])) continue;
+    PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", scene->key[k]));
+    PetscCall(PetscOptionsHasName(NULL, NULL, dashed, &set));
+    if (set) continue;
+    PetscCall(PetscOptionsSetValue(NULL, dashed, scene->value[k]));
+    scene->shared[k] = PETSC_TRUE;
+    PetscCall(HycoOptionsOfSolver(scene->key[k], &solvers, &reads));
+    HycoCheck(reads, "the option %s is unknown: none of PETSc's solvers in hyco reads it", scene->key[k]);
+    PetscCall(PetscOptionsHasName(NULL, NULL, dashed, &set));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoEntriesUnshare(HycoScene scene)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; scene->shared && k < scene->n_entries; k++) {
+    char dashed[HYCO_LINE];
+
+    PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", scene->key[k]));
+    if (scene->shared[k]) PetscCall(PetscOptionsClearValue(NULL, dashed));
+  }
+  PetscCall(PetscFree(scene->shared));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The scene's file and folder: `path` is a folder with scene.yaml, or the file. 16 characters of room for what is
    appended. */
 static PetscErrorCode FindFile(const char path[], char file[PETSC_MAX_PATH_LEN], char folder[PETSC_MAX_PATH_LEN])

@@ -240,6 +240,7 @@ PetscErrorCode HycoROMCompare(HycoROM m, HycoFOM f, HycoErrors *e)
 
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  HycoCheckGiven(e);
   PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoROMCompare()");
   HycoOnRoot(HycoComm(f), Check(m, f));
   PetscCall(Keep(m, f, &k));

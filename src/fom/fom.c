@@ -214,7 +214,7 @@ PetscErrorCode HycoFOMDeclare(PetscOptions options)
 static PetscErrorCode SetUp(HycoFOM f)
 {
   PetscFunctionBegin;
-  PetscCall(PetscObjectSetOptions((PetscObject)f, f->scene->options));
+  PetscCall(HycoSceneGiveOptions(f->scene, (PetscObject)f));
   PetscCall(SetFromOptions(f));
   f->summary.seconds.setup = -HycoNow();
   HycoLogged(HYCO_EVENT_MESH, ReadMesh(f));
@@ -229,7 +229,7 @@ static PetscErrorCode SetUp(HycoFOM f)
   if (f->size > 1) PetscCall(HycoFOMSetUpSurface(f));
   PetscCall(HycoSystemCreate(HycoComm(f), &f->system));
   PetscCall(HycoSolverCreate(HycoComm(f), &f->solver));
-  PetscCall(PetscObjectSetOptions((PetscObject)f->solver, f->scene->options));
+  PetscCall(HycoOptionsInherit((PetscObject)f->solver, (PetscObject)f));
   PetscCall(HycoSolverSetFromOptions(f->solver));
   PetscCall(PetscMalloc1(f->fe->n_dof, &f->u));
   if (f->size == 1) f->u_surface = f->u;
@@ -247,6 +247,7 @@ PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
 {
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  HycoCheckGiven(fom);
   PetscCall(Create(comm, fom));
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*fom)->scene = scene;
@@ -263,7 +264,7 @@ PetscErrorCode HycoFOMCreateMesh(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
   PetscCall(Create(comm, fom));
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*fom)->scene = scene;
-  PetscCall(PetscObjectSetOptions((PetscObject)*fom, scene->options));
+  PetscCall(HycoSceneGiveOptions(scene, (PetscObject)*fom));
   ierr = SetFromOptions(*fom);
   /* A training would write the mesh once more at each of its parts. */
   (*fom)->mesh_write[0] = '\0'; /* only for solves */
@@ -280,6 +281,7 @@ PetscErrorCode HycoFOMGetSolver(HycoFOM f, HycoSolver *solver)
 {
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  HycoCheckGiven(solver);
   *solver = f->solver;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -593,6 +595,7 @@ PetscErrorCode HycoFOMGetSystem(HycoFOM f, HycoSystem *system)
 {
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  HycoCheckGiven(system);
   *system = f->system;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -110,7 +110,7 @@ PetscErrorCode HycoFrictionCreate(HycoFOM f)
   PetscCall(HycoSolverCreate(HycoComm(f), &r->solver));
   /* The cone of Coulomb is no set of bounds: neither active set nor TAO takes it. */
   PetscCall(HycoSolverSetType(r->solver, HYCO_SOLVER_SEMISMOOTH));
-  PetscCall(PetscObjectSetOptions((PetscObject)r->solver, f->scene->options));
+  PetscCall(HycoOptionsInherit((PetscObject)r->solver, (PetscObject)f));
   PetscCall(HycoSolverSetFromOptions(r->solver));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -528,6 +528,7 @@ PetscErrorCode HycoFOMGetGradient(HycoFOM f, HycoGradient *gradient)
 
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  HycoCheckGiven(gradient);
   PetscCall(Check(f));
   if (f->path) {
     PetscCall(HycoPathGradient(f, gradient));

@@ -476,6 +476,7 @@ PetscErrorCode HycoFOMGetHistory(HycoFOM f, HycoHistory *h)
 {
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  HycoCheckGiven(h);
   PetscCall(PetscMemzero(h, sizeof(*h)));
   if (f->path) HycoPathGetHistory(f->path, h);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -345,6 +345,9 @@ PetscErrorCode HycoFOMGetReactions(HycoFOM f, PetscInt *n, const HycoReaction *r
 
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  HycoCheckGiven(n);
+  HycoCheckGiven(result);
+  HycoCheckGiven(balance);
   PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMGetReactions()");
   scene = f->scene;
   n_dof = f->fe->n_dof;

@@ -14,7 +14,7 @@ static PetscErrorCode SetUp(HycoFOM f)
   if (f->given_solver) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSystemCreate(HycoComm(f), &f->given_system));
   PetscCall(HycoSolverCreate(HycoComm(f), &f->given_solver));
-  PetscCall(PetscObjectSetOptions((PetscObject)f->given_solver, f->scene->options));
+  PetscCall(HycoOptionsInherit((PetscObject)f->given_solver, (PetscObject)f));
   PetscCall(HycoSolverSetFromOptions(f->given_solver));
   PetscCall(HycoSolverSetType(f->given_solver, HYCO_SOLVER_ACTIVE_SET)); /* without its contacts */
   PetscCall(HycoSolverSetForm(f->given_solver, HYCO_FORM_AUTO));

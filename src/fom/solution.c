@@ -183,6 +183,7 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
 
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  HycoCheckGiven(out);
   s = &f->summary;
   PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMGetSummary()");
   s->dim = f->fe->dim;
@@ -201,6 +202,7 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   /* forces of another solution do not satisfy the identity, and rounding of U changes it as it does the residual */
   defect = f->path || f->given || s->energy_defect <= s->kkt.rounding ? 0 : s->energy_defect;
   PetscCall(HycoFOMJudge(f, f->u, f->n_contacts ? f->Lambda : NULL, defect, &s->reason, &s->u_relative, why));
+  if (!f->path) HycoSolverExplain(f->given ? f->given_solver : f->solver, why);
   PetscCall(PetscStrncpy(s->why, why, sizeof(s->why)));
   PetscCall(MeasureContacts(f, s));
   why[0] = '\0';
@@ -226,6 +228,8 @@ PetscErrorCode HycoFOMGetContacts(HycoFOM f, PetscInt *n, const HycoContactResul
 {
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  HycoCheckGiven(n);
+  HycoCheckGiven(result);
   PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMGetContacts()");
   PetscCall(SumContacts(f));
   *n = f->scene->n_contacts;
@@ -332,6 +336,7 @@ PetscErrorCode HycoFOMWrite(HycoFOM f, const char path[])
 
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  HycoCheckGiven(path);
   PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMWrite()");
   PetscCall(Look(f, &solution));
   PetscCall(HycoSolutionWrite(path, &solution));
@@ -344,6 +349,7 @@ PetscErrorCode HycoFOMWriteBegin(HycoFOM f, const char path[], PetscInt n)
 {
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  HycoCheckGiven(path);
   HycoCheck(!f->path, "HycoFOMWriteBegin: the scene has a history; HycoFOMSetSeries() writes its path");
   PetscCall(HycoFieldFileDestroy(&f->set));
   PetscCall(HycoFieldFileCreate(HycoComm(f), path, n, PETSC_TRUE, &f->set));

@@ -81,6 +81,8 @@ PetscErrorCode HycoInspectionCountTraining(HycoScene s, HycoSamples samples, Pet
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SCENE_CLASSID);
+  HycoCheckGiven(n_training);
+  HycoCheckGiven(n_stiffness);
   HycoSceneReaches(s, reaches);
   for (PetscInt p = 0; p < s->n_parameters; p++) any = (PetscBool)(any || reaches[p]);
   if (samples) PetscCall(HycoSamplesGet(samples, &n, NULL, &mu));

@@ -248,6 +248,7 @@ PetscErrorCode HycoInspect(HycoFOM f, HycoInspection *in)
 
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  HycoCheckGiven(in);
   PetscCall(PetscMemzero(in, sizeof(*in)));
   HycoOnEach(HycoComm(f), Begin(f, in));
   ierr = Visit(f, in);

@@ -11,6 +11,7 @@ HycoDefineRegister(HycoMaterialRegister, laws, PetscErrorCode (*create)(HycoMate
 PetscErrorCode HycoMaterialCreate(MPI_Comm comm, HycoMaterial *material)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(material);
   PetscCall(HycoPackageCheck());
   PetscCall(PetscHeaderCreate(*material, HYCO_MATERIAL_CLASSID, "HycoMaterial", "Material law", "Hyco", comm,
                               HycoMaterialDestroy, HycoMaterialView));
@@ -37,6 +38,7 @@ PetscErrorCode HycoMaterialSetType(HycoMaterial material, HycoMaterialType type)
 
   PetscFunctionBegin;
   HycoCheckHandle(material, HYCO_MATERIAL_CLASSID);
+  HycoCheckGiven(type);
   PetscCall(HycoRegistryFind(&laws, type, &create));
   if (!create) {
     char list[HYCO_LINE];
@@ -56,6 +58,7 @@ PetscErrorCode HycoMaterialGetType(HycoMaterial material, HycoMaterialType *type
 {
   PetscFunctionBegin;
   HycoCheckHandle(material, HYCO_MATERIAL_CLASSID);
+  HycoCheckGiven(type);
   *type = ((PetscObject)material)->type_name;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -107,6 +110,8 @@ PetscErrorCode HycoMaterialGetText(HycoMaterial material, const char name[], con
 
   PetscFunctionBegin;
   HycoCheckHandle(material, HYCO_MATERIAL_CLASSID);
+  HycoCheckGiven(name);
+  HycoCheckGiven(text);
   entry = HycoDeclaredFind(&material->constants, name);
   *text = entry ? entry->text : NULL;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -118,6 +123,7 @@ PetscErrorCode HycoMaterialSetOps(HycoMaterial material, const struct _HycoMater
 {
   PetscFunctionBegin;
   HycoCheckHandle(material, HYCO_MATERIAL_CLASSID);
+  HycoCheckGiven(ops);
   PetscCheck(ops->update || ops->isotropic, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONGSTATE,
              "the law %s sets neither update nor isotropic", ((PetscObject)material)->type_name);
   *material->ops = *ops;
@@ -182,6 +188,7 @@ PetscErrorCode HycoMaterialGetData(HycoMaterial material, void *data)
 {
   PetscFunctionBegin;
   HycoCheckHandle(material, HYCO_MATERIAL_CLASSID);
+  HycoCheckGiven(data);
   *(void **)data = material->data;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -302,12 +309,14 @@ static void ExpandLame(PetscInt dim, const PetscReal lame[2], PetscReal tangent[
 /* Evaluates p->n points; a linear law by its tangents. p->failed: the first point without a solution, -1: none. */
 PetscErrorCode HycoMaterialUpdate(HycoMaterial material, HycoMaterialPoints *p)
 {
-  const PetscInt ns = p->n_strain;
+  PetscInt ns;
   PetscReal *lame;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   HycoCheckHandle(material, HYCO_MATERIAL_CLASSID);
+  HycoCheckGiven(p);
+  ns = p->n_strain;
   p->dt_factor = 1;
   p->failed = -1;
   if (!IsLame(material)) {

@@ -430,7 +430,7 @@ static PetscErrorCode CheckForces(HycoReducer t, HycoROM m)
   PetscBool presses = PETSC_FALSE, kept = PETSC_FALSE;
 
   PetscFunctionBegin;
-  PetscCall(PetscObjectSetOptions((PetscObject)t->prototype, t->scene->options));
+  PetscCall(HycoOptionsInherit((PetscObject)t->prototype, (PetscObject)t));
   PetscCall(HycoROMSetFromOptions(t->prototype)); /* as for the model's predictions */
   /* One contact suffices here: how well the RID covers the force is judged on held-out points. */
   for (PetscInt k = 0; k < m->model->pairs.n; k++) kept = (PetscBool)(kept || m->model->in_rid[k]);
@@ -512,7 +512,7 @@ static PetscErrorCode BuildModel(HycoReducer t, PetscBool useful, HycoROM m, Hyc
   if (useful) PetscCall(CheckUseful(t, m));
   PetscCall(Report(t, m, report));
   PetscCall(HycoROMReset(m));
-  PetscCall(PetscObjectSetOptions((PetscObject)m, m->model->scene->options));
+  PetscCall(HycoOptionsInherit((PetscObject)m, (PetscObject)t));
   PetscCall(HycoROMSetFromOptions(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -747,6 +747,7 @@ PetscErrorCode HycoReducerSolve(HycoReducer t, HycoSnapshots store, HycoSamples 
 }
 
 HycoDefineMethod(HycoReducerGetSolving, (HycoReducer t, const char *what[]), t, HYCO_REDUCER_CLASSID,
+                 HycoCheckGiven(what);
                  *what = t->solves_held ? "held-out solutions" : "snapshots")
 
 /* Default number of held-out points: enough for a bound for 95 % of future points if the training is large enough to

@@ -110,7 +110,7 @@ static PetscErrorCode SetUp(HycoIndicator d)
   PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, m->fe->mesh->n_nodes, 0, &d->M));
   PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &d->system));
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &d->solver));
-  PetscCall(PetscObjectSetOptions((PetscObject)d->solver, m->model->scene->options));
+  PetscCall(HycoOptionsInherit((PetscObject)d->solver, (PetscObject)m));
   /* The scene's options: the local problem is solved as full order would be. */
   PetscCall(HycoSolverSetFromOptions(d->solver));
   PetscCall(HycoSolverSetWarmStart(d->solver, PETSC_FALSE)); /* no warm start, because the ranks share the points */

@@ -42,6 +42,7 @@ PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscIn
 
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  HycoCheckGiven(groups);
   *groups = 0;
   PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCall(ReadGroups(comm, scene->options, groups, &monitor));
@@ -99,6 +100,7 @@ PetscErrorCode HycoSnapshotsCreateQueue(MPI_Comm comm, HycoScene scene, PetscInt
   PetscInt groups, *kind;
 
   PetscFunctionBegin;
+  HycoCheckGiven(queue);
   PetscCall(HycoSnapshotsChooseGroups(comm, scene, n_all, &groups));
   PetscCall(PetscMalloc1(n, &kind));
   HycoOnRoot(comm, FindKinds(scene, n_par, mu, n, list, kind));

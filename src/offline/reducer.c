@@ -1,5 +1,6 @@
 /* HycoReducer: creation, options, destruction. */
 #include <hycoalgorithms.h>
+#include <hycoentries.h>
 #include <hycomaterialimpl.h>
 #include <hycoreducerimpl.h>
 #include <string.h>
@@ -71,6 +72,7 @@ PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *re
 {
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  HycoCheckGiven(reducer);
   PetscCall(Create(comm, reducer));
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*reducer)->scene = scene;
@@ -81,7 +83,7 @@ PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *re
   for (PetscInt b = 0; b < scene->n_bodies && scene->n_times; b++) {
     if (!scene->body[b].law->linear) (*reducer)->seed[HYCO_SEED_INELASTIC] = PETSC_TRUE;
   }
-  PetscCall(PetscObjectSetOptions((PetscObject)*reducer, scene->options));
+  PetscCall(HycoSceneGiveOptions(scene, (PetscObject)*reducer));
   PetscCall(HycoReducerSetType(*reducer, HycoSceneHasFriction(scene) ? HYCO_ROM_BODIES : HYCO_ROM_HYBRID));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -146,13 +148,14 @@ PetscErrorCode HycoReducerDestroy(HycoReducer *reducer)
 }
 
 HycoDefineMethod(HycoReducerSetSnapshotFolder, (HycoReducer t, const char folder[]), t, HYCO_REDUCER_CLASSID,
+                 HycoCheckGiven(folder);
                  PetscCall(PetscStrncpy(t->folder, folder, sizeof(t->folder))))
 HycoDefineMethod(HycoReducerGetSolved, (HycoReducer t, PetscInt *n_groups, const PetscInt *solved[]), t,
-                 HYCO_REDUCER_CLASSID, *n_groups = t->n_solvers;
-                 *solved = t->solved)
+                 HYCO_REDUCER_CLASSID, HycoCheckGiven(n_groups);
+                 HycoCheckGiven(solved); *n_groups = t->n_solvers; *solved = t->solved)
 HycoDefineMethod(HycoReducerGetBalance, (HycoReducer t, PetscInt *unsolved, const PetscReal *written[]), t,
-                 HYCO_REDUCER_CLASSID, *unsolved = t->unsolved;
-                 *written = t->written)
+                 HYCO_REDUCER_CLASSID, HycoCheckGiven(unsolved);
+                 HycoCheckGiven(written); *unsolved = t->unsolved; *written = t->written)
 HycoDefineMethod(HycoReducerSetProgress, (HycoReducer t, HycoProgress progress, void *ctx), t, HYCO_REDUCER_CLASSID,
                  t->progress = progress;
                  t->progress_ctx = ctx)
@@ -192,6 +195,7 @@ PetscErrorCode HycoReducerSetTargets(HycoReducer t, const PetscReal target[], Pe
 {
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
+  HycoCheckGiven(target);
   for (PetscInt e = 0; e < HYCO_N_ERRORS; e++) {
     HycoCheck(target[e] >= 0, "the target of the error %s is %g; it must be positive (0: none)", HycoErrorKinds[e],
               (double)target[e]);
@@ -470,6 +474,7 @@ PetscErrorCode HycoReducerSetFromOptions(HycoReducer t)
 {
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
+  PetscCall(HycoEntriesOverride(t->scene->options, PETSC_TRUE)); /* what a program has set since */
   PetscCall(ReadAll(t));
   PetscCall(CheckSVDOptions(t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -498,18 +503,20 @@ PetscErrorCode HycoReducerDeclare(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-HycoDefineMethod(HycoReducerGetType, (HycoReducer t, HycoROMType *type), t, HYCO_REDUCER_CLASSID,
+HycoDefineMethod(HycoReducerGetType, (HycoReducer t, HycoROMType *type), t, HYCO_REDUCER_CLASSID, HycoCheckGiven(type);
                  *type = t->prototype->model->type)
 
 /* Without a search, or without held-out points to judge by, the present type is the only one. */
 PetscErrorCode HycoReducerTries(HycoReducer t, const char types[], PetscBool *tries)
 {
-  const PetscBool searches =
-      (PetscBool)(t->search && !t->pinned[HYCO_CHOICE_TYPE] && (t->validation || t->n_validation));
   const char *const *names;
+  PetscBool searches;
 
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
+  HycoCheckGiven(types);
+  HycoCheckGiven(tries);
+  searches = (PetscBool)(t->search && !t->pinned[HYCO_CHOICE_TYPE] && (t->validation || t->n_validation));
   /* types: a list of names in one text, as in the table of options. */
   *tries = (PetscBool)(strstr(types, t->prototype->model->type) != NULL);
   PetscCall(HycoTrainerNames(&names));

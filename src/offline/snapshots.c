@@ -48,6 +48,8 @@ PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char fold
 
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  HycoCheckGiven(folder);
+  HycoCheckGiven(snapshots);
   PetscCall(PetscHeaderCreate(s, HYCO_SNAPSHOTS_CLASSID, "HycoSnapshots", "Store of full-order solutions", "Hyco", comm,
                               HycoSnapshotsDestroy, HycoSnapshotsView));
   PetscCall(PetscObjectReference((PetscObject)scene));
@@ -606,11 +608,11 @@ PetscErrorCode HycoSnapshotsFill(HycoSnapshots s, HycoSamples samples, HycoProgr
 }
 
 HycoDefineMethod(HycoSnapshotsGetSolved, (HycoSnapshots s, PetscInt *n_groups, const PetscInt *solved[]), s,
-                 HYCO_SNAPSHOTS_CLASSID, *n_groups = s->n_groups;
-                 *solved = s->solved)
+                 HYCO_SNAPSHOTS_CLASSID, HycoCheckGiven(n_groups);
+                 HycoCheckGiven(solved); *n_groups = s->n_groups; *solved = s->solved)
 HycoDefineMethod(HycoSnapshotsGetBalance, (HycoSnapshots s, PetscInt *unsolved, const PetscReal *written[]), s,
-                 HYCO_SNAPSHOTS_CLASSID, *unsolved = s->unsolved;
-                 *written = s->written)
+                 HYCO_SNAPSHOTS_CLASSID, HycoCheckGiven(unsolved);
+                 HycoCheckGiven(written); *unsolved = s->unsolved; *written = s->written)
 
 /* Rows lo .. lo + rows - 1 of the n samples at mu. */
 static PetscErrorCode ReadColumns(HycoSnapshots s, PetscInt n, const PetscReal mu[], const char field[], PetscInt lo,

@@ -154,10 +154,10 @@ static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal 
       }
     }
     if (HycoPairsAlone(fe->scene, pairs, k)) f->gap[k] = NAN;
-    if (!(f->gap_node[s] <= f->gap[k])) /* for a node in several contacts the smallest */
+    if (!islessequal(f->gap_node[s], f->gap[k])) /* for a node in several contacts the smallest */
       f->gap_node[s] = f->gap[k];
     /* Not a number compares false, and is replaced. */
-    if (!(f->which[s] <= pairs->contact[k])) f->which[s] = pairs->contact[k];
+    if (!islessequal(f->which[s], pairs->contact[k])) f->which[s] = pairs->contact[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

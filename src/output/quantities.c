@@ -125,7 +125,7 @@ PetscBool HycoQuantityOfPosition(const HycoQuantity *q)
 
 PetscBool HycoSceneQuantityIsOfPosition(HycoScene scene, PetscInt q)
 {
-  return HycoQuantityOfPosition(&scene->quantity[q]);
+  return (PetscBool)(scene && q >= 0 && q < scene->n_quantities && HycoQuantityOfPosition(&scene->quantity[q]));
 }
 
 /* A subset of HycoQuantitiesMarkCells(): stresses cost more to store than displacements, and outputs of

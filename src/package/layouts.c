@@ -120,6 +120,8 @@ PetscErrorCode HycoGetLayout(const char type[], size_t *size, PetscInt *n, const
   size_t k = 0;
 
   PetscFunctionBegin;
+  HycoCheckGiven(type);
+  HycoCheckGiven(size);
   while (k < all && strcmp(layouts[k].name, type)) k++;
   HycoCheck(k < all, "there is no layout of a type %s; HycoSummary, HycoPrediction and others have one", type);
   *size = layouts[k].size;

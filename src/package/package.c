@@ -87,5 +87,6 @@ PetscErrorCode HycoInitializePackage(void)
   PetscCall(RegisterModels());
   PetscCall(HycoExtensionsRegister());
   HycoOptionsSetDeclare(HycoDeclareClasses);
+  HycoOptionsSetProbe(HycoSolversProbe);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -143,7 +143,7 @@ PetscErrorCode HycoSceneReadHistory(HycoScene s)
    with tangents, since types of models and sizes may not depend on mu. */
 PetscBool HycoSceneHasFriction(HycoScene s)
 {
-  for (PetscInt k = 0; k < s->n_contacts; k++) {
+  for (PetscInt k = 0; s && k < s->n_contacts; k++) {
     if (s->contact[k]->friction) return PETSC_TRUE;
   }
   return PETSC_FALSE;
@@ -235,6 +235,7 @@ PetscErrorCode HycoSceneGetHistory(HycoScene s, PetscInt *n, const PetscReal *ti
 PetscErrorCode HycoSceneRefuseHistory(HycoScene s, const char what[])
 {
   PetscFunctionBegin;
+  HycoCheckHandle(s, HYCO_SCENE_CLASSID);
   HycoCheck(!s->n_times,
             "the scene has a history (history_times), and %s is for scenes without one; use hyco solve -mu for a path "
             "at full order, or hyco train -grid N,N,... for a reduced model",

@@ -287,6 +287,7 @@ PetscErrorCode HycoSamplesUnseen(HycoSamples samples, PetscInt first, PetscInt c
   HycoScene scene;
 
   PetscFunctionBegin;
+  HycoCheckGiven(unseen);
   PetscCall(HycoSamplesGet(samples, &n, &d.n_par, &mu));
   PetscCall(HycoSamplesGetScene(samples, &scene));
   /* Within the training's reach: the drawn points are to judge interpolation, which is all that a model promises. The
@@ -336,6 +337,7 @@ PetscErrorCode HycoSamplesExcept(HycoSamples samples, HycoSamples seen, HycoSamp
   PetscBool twin;
 
   PetscFunctionBegin;
+  HycoCheckGiven(rest);
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
   PetscCall(HycoSamplesGet(seen, &m, NULL, &other));
   PetscCall(HycoSamplesGetScene(samples, &scene));

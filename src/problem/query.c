@@ -23,6 +23,7 @@ PetscErrorCode HycoSceneGetQuantities(HycoScene scene, PetscInt *n, const char *
 {
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  HycoCheckGiven(n);
   *n = scene->n_quantities;
   for (PetscInt k = 0; k < *n && names; k++) names[k] = scene->quantity[k].name;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -32,6 +33,7 @@ PetscErrorCode HycoSceneGetQuantityUnits(HycoScene scene, PetscInt *n, const cha
 {
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  HycoCheckGiven(n);
   *n = scene->n_quantities;
   for (PetscInt k = 0; k < *n && units; k++) units[k] = scene->quantity[k].unit;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -43,18 +45,23 @@ PetscErrorCode HycoSceneGetContacts(HycoScene scene, PetscInt *n, const char *na
 {
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  HycoCheckGiven(n);
   *n = scene->n_contacts;
   for (PetscInt k = 0; k < *n && names; k++) names[k] = scene->contact[k]->name;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 HycoDefineMethod(HycoSceneGetTitle, (HycoScene scene, const char *title[]), scene, HYCO_SCENE_CLASSID,
+                 HycoCheckGiven(title);
                  *title = scene->title)
 HycoDefineMethod(HycoSceneGetMesh, (HycoScene scene, const char *path[]), scene, HYCO_SCENE_CLASSID,
+                 HycoCheckGiven(path);
                  *path = scene->mesh_path)
 HycoDefineMethod(HycoSceneHasContact, (HycoScene scene, PetscBool *contact), scene, HYCO_SCENE_CLASSID,
+                 HycoCheckGiven(contact);
                  *contact = (PetscBool)(scene->n_contacts > 0))
 HycoDefineMethod(HycoSceneGetOptions, (HycoScene scene, PetscOptions *options), scene, HYCO_SCENE_CLASSID,
+                 HycoCheckGiven(options);
                  *options = scene->options)
 
 /* "radius = 4, load = 0.1"; cut at the end of the line. */
@@ -107,6 +114,7 @@ PetscErrorCode HycoSceneSetDM(HycoScene scene, DM dm)
 
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  HycoCheckGiven(dm);
   PetscCall(PetscObjectTypeCompare((PetscObject)dm, DMPLEX, &is_plex));
   HycoCheck(is_plex, "HycoSceneSetDM: the DM is not a DMPlex");
   PetscCall(PetscObjectReference((PetscObject)dm));
@@ -195,6 +203,7 @@ PetscErrorCode HycoSceneView(HycoScene scene, PetscViewer viewer)
 {
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  if (!viewer) PetscCall(PetscViewerASCIIGetStdout(HycoComm(scene), &viewer));
   PetscCall(PetscViewerASCIIPrintf(viewer, "scene: %s\n", scene->title[0] ? scene->title : "(no title)"));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  mesh: %s\n", scene->mesh_path[0] ? scene->mesh_path : "(none)"));
   for (PetscInt p = 0; p < scene->n_parameters; p++) {

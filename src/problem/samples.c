@@ -17,6 +17,7 @@ PetscErrorCode HycoSamplesCreate(HycoScene scene, HycoSamples *samples)
 {
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  HycoCheckGiven(samples);
   PetscCall(HycoPackageCheck());
   PetscCall(PetscHeaderCreate(*samples, HYCO_SAMPLES_CLASSID, "HycoSamples", "Points of the parameter space", "Hyco",
                               HycoComm(scene), HycoSamplesDestroy, HycoSamplesView));
@@ -68,6 +69,8 @@ PetscErrorCode HycoSamplesAddProduct(HycoSamples s, const PetscInt counts[], con
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
   HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
+  HycoCheckGiven(counts);
+  HycoCheckGiven(values);
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
     HycoCheckValue(counts[p] >= 1, "parameter %s has %d values; at least 1 is needed", s->scene->parameter[p],
                    (int)counts[p]);
@@ -135,6 +138,7 @@ static PetscErrorCode AddGrid(HycoSamples s, const PetscInt counts[], PetscBool 
 PetscErrorCode HycoSamplesAddGrid(HycoSamples s, const PetscInt counts[], PetscBool closed)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(counts);
   PetscCall(AddGrid(s, counts, closed, closed ? 2 : 1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -143,6 +147,7 @@ PetscErrorCode HycoSamplesAddGrid(HycoSamples s, const PetscInt counts[], PetscB
 PetscErrorCode HycoSamplesAddTrainingGrid(HycoSamples s, const PetscInt counts[])
 {
   PetscFunctionBegin;
+  HycoCheckGiven(counts);
   PetscCall(AddGrid(s, counts, PETSC_TRUE, 1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -156,6 +161,7 @@ PetscErrorCode HycoSamplesAddChebyshev(HycoSamples s, const PetscInt counts[])
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
   HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
+  HycoCheckGiven(counts);
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
     /* All counts before the first allocation: a failed check would leak the nodes of the former parameters. */
     HycoCheckValue(counts[p] >= 1 && counts[p] <= 100000000, "the grid has %d points for %s; at least 1 is needed",
@@ -243,9 +249,8 @@ static PetscErrorCode ReadFile(HycoSamples s, const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-HycoDefineMethod(HycoSamplesAddFile, (HycoSamples s, const char path[]), s, HYCO_SAMPLES_CLASSID,
-                 HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
-                 HycoOnEach(HycoComm(s->scene), ReadFile(s, path)))
+HycoDefineMethod(HycoSamplesAddFile, (HycoSamples s, const char path[]), s, HYCO_SAMPLES_CLASSID, HycoCheckGiven(path);
+                 HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID); HycoOnEach(HycoComm(s->scene), ReadFile(s, path)))
 
 typedef struct {
   unsigned long long hash;

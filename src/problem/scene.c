@@ -548,7 +548,10 @@ static PetscErrorCode CheckPlainEntry(HycoScene s, PetscInt entry)
               key);
   } else if (!HycoOptionFind(key)) {
     const char *near = HycoOptionNearest(key, NULL);
+    PetscBool solvers, reads;
 
+    PetscCall(HycoOptionsOfSolver(key, &solvers, &reads));
+    if (solvers) PetscFunctionReturn(PETSC_SUCCESS); /* HycoEntriesShare() judges it */
     /* First for the reasons it knows, such as an option of an older version; then for a likely typing error. */
     PetscCall(HycoOptionsCheckName(key));
     HycoCheck(!near, "the option %s is unknown; did you mean %s?", key, near);
@@ -796,7 +799,9 @@ static PetscErrorCode LoadInto(HycoScene s, const char path[])
   PetscFunctionBegin;
   HycoOnEach(HycoComm(s), HycoReserveBLAS());
   PetscCall(HycoEntriesRead(HycoComm(s), path, &s->options, folder));
+  PetscCall(PetscObjectSetOptions((PetscObject)s, s->options));
   HycoOnEach(HycoComm(s), Build(s, folder));
+  HycoOnEach(HycoComm(s), HycoEntriesShare(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -828,7 +833,9 @@ static PetscErrorCode FillFromEntries(HycoScene s, PetscInt n, char *const key[]
     PetscCall(PetscOptionsSetValue(s->options, dashed, value[k]));
   }
   PetscCall(HycoEntriesOverride(s->options, PETSC_TRUE));
+  PetscCall(PetscObjectSetOptions((PetscObject)s, s->options));
   PetscCall(Build(s, folder));
+  PetscCall(HycoEntriesShare(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -842,6 +849,15 @@ PetscErrorCode HycoSceneFromEntries(MPI_Comm comm, PetscInt n, char *const key[]
   PetscCall(PetscHeaderCreate(*scene, HYCO_SCENE_CLASSID, "HycoScene", "Scene of bodies in contact", "Hyco", comm,
                               HycoSceneDestroy, HycoSceneView));
   HycoOnError(FillFromEntries(*scene, n, key, value, folder), PetscCall(HycoSceneDestroy(scene)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The command line again: a program may have set options since. */
+PetscErrorCode HycoSceneGiveOptions(HycoScene scene, PetscObject object)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoEntriesOverride(scene->options, PETSC_TRUE));
+  PetscCall(HycoOptionsInherit(object, (PetscObject)scene));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -952,6 +968,7 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
   }
   PetscCall(HycoSceneDestroyMotion(s));
   for (PetscInt k = 0; k < s->n_contacts; k++) PetscCall(HycoContactDestroy(&s->contact[k]));
+  PetscCall(HycoEntriesUnshare(s));
   for (PetscInt k = 0; k < s->n_entries; k++) {
     HycoFreeAll(&s->key[k], &s->value[k]);
   }

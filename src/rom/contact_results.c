@@ -137,6 +137,8 @@ PetscErrorCode HycoROMGetContacts(HycoROM m, PetscInt *n, const HycoContactResul
 {
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  HycoCheckGiven(n);
+  HycoCheckGiven(result);
   PetscCheck(m->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoROMPredict() before HycoROMGetContacts()");
   HycoTraceShow(m, m->trace.shown);
   PetscCall(HycoROMSumContacts(m, m->Lambda, result));

@@ -276,6 +276,7 @@ PetscErrorCode HycoROMGetEquilibrium(HycoROM m, HycoEquilibrium *e)
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  HycoCheckGiven(e);
   PetscCheck(m->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoROMPredict() before HycoROMGetEquilibrium()");
   HycoCheck(m->model->scene->n_times, "HycoROMGetEquilibrium: the model's scene has no history");
   PetscCall(HycoROMLoadWhole(m));

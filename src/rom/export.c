@@ -13,6 +13,9 @@ PetscErrorCode HycoROMExport(HycoROM m, const char format[], const char path[], 
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  HycoCheckGiven(format);
+  HycoCheckGiven(path);
+  HycoCheckGiven(description);
   PetscCall(HycoRegistryFind(&formats, format, &write));
   HycoCheck(write, "this build has no export to %s; build it with the extension export (HYCO_EXTENSIONS)", format);
   PetscCall(write(m, path, description));

@@ -467,13 +467,20 @@ PetscErrorCode HycoROMFit(HycoROM m, PetscInt n, const PetscInt output[], const 
                           const PetscReal start[], const PetscReal held[], PetscInt n_samples, PetscInt n_starts,
                           const char type[], PetscReal mu[], HycoFit *fit)
 {
-  const HycoScene scene = m->model->scene;
-  Fit f = {.model = m, .n = n, .output = output, .target = target, .n_par = scene->n_parameters};
+  Fit f = {.model = m, .n = n, .output = output, .target = target};
+  HycoScene scene;
   PetscReal x[HYCO_MAX_PARAMETERS], *starts;
   PetscInt n_free;
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  HycoCheckGiven(output);
+  HycoCheckGiven(target);
+  HycoCheckGiven(mu);
+  HycoCheckGiven(fit);
+  HycoCheckGiven(type);
+  scene = m->model->scene;
+  f.n_par = scene->n_parameters;
   HycoCheck(n > 0 && n <= HYCO_MAX_QUANTITIES && n_samples > 0 && n_starts > 0,
             "a fit has %d targets, %d samples and %d starts; at least 1 of each is expected", (int)n, (int)n_samples,
             (int)n_starts);

@@ -526,6 +526,7 @@ PetscErrorCode HycoROMGetGradient(HycoROM m, HycoGradient *gradient)
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  HycoCheckGiven(gradient);
   PetscCall(Check(m));
   if (m->model->scene->n_times) {
     PetscCall(HycoROMPathGradient(m, gradient));

@@ -14,7 +14,7 @@ PetscErrorCode HycoROMSetUpFields(HycoROM m)
   PetscCall(PetscCalloc1(m->model->pairs.n, &m->Lambda));
   PetscCall(PetscMalloc1(m->model->mesh->n_cells * m->fe->n_sigma, &m->stress));
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &m->solver));
-  PetscCall(PetscObjectSetOptions((PetscObject)m->solver, m->model->scene->options));
+  PetscCall(HycoOptionsInherit((PetscObject)m->solver, (PetscObject)m));
   PetscCall(HycoSolverSetFromOptions(m->solver));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -23,6 +23,7 @@ PetscErrorCode HycoROMSetUpFields(HycoROM m)
 PetscErrorCode HycoROMSetUpDefault(HycoROM m)
 {
   PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
   PetscCall(HycoFECreate(m->model->scene, m->model->mesh->dm, &m->fe));
   m->n = m->model->l;
   m->m = m->n_L = m->model->pairs.n;
@@ -138,6 +139,8 @@ PetscErrorCode HycoROMSetSolution(HycoROM m, const PetscReal mu[], const PetscRe
   PetscReal sum = 0;
 
   PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  HycoCheckGiven(mu);
   if (gamma) PetscCall(PetscArraycpy(m->gamma, gamma, m->model->l));
   if (Lambda) PetscCall(PetscArraycpy(m->Lambda, Lambda, m->model->pairs.n));
   PetscCall(HycoROMBringRows(m, mu));

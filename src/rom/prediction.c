@@ -20,6 +20,7 @@ PetscErrorCode HycoROMGetStrainEnergy(HycoROM m, PetscReal *energy)
   PetscBool known = PETSC_FALSE;
 
   PetscFunctionBegin;
+  HycoCheckGiven(energy);
   PetscCall(CheckSolved(m));
   /* The energy of a path is that of the laws' elastic strains, summed when the state was there. */
   if (m->trace.n_listed) {
@@ -132,6 +133,7 @@ PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
   HycoPrediction *p;
 
   PetscFunctionBegin;
+  HycoCheckGiven(out);
   PetscCall(CheckSolved(m));
   p = &m->prediction;
   p->dim = m->fe->dim;
@@ -253,6 +255,7 @@ PetscErrorCode HycoROMWrite(HycoROM m, const char path[])
   PetscReal *rid;
 
   PetscFunctionBegin;
+  HycoCheckGiven(path);
   PetscCall(CheckSolved(m));
   /* A series: the laws are replayed on the whole mesh. */
   if (m->model->scene->n_times) {
@@ -286,6 +289,7 @@ PetscErrorCode HycoROMWriteMany(HycoROM m, PetscInt n, PetscInt n_parameters, co
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  HycoCheckGiven(path);
   HycoCheck(!m->model->scene->n_times, "HycoROMWriteMany: the scene has a history; HycoROMWrite() writes a path");
   PetscCall(HycoROMCheckPoints(m, n, n_parameters, mu));
   PetscCall(HycoFieldFileCreate(PETSC_COMM_SELF, path, n, PETSC_TRUE, &file));
@@ -305,6 +309,7 @@ PetscErrorCode HycoROMView(HycoROM m, PetscViewer viewer)
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  if (!viewer) PetscCall(PetscViewerASCIIGetStdout(HycoComm(m), &viewer));
   pod = HycoROMCountPOD(m);
   PetscCall(PetscViewerASCIIPrintf(viewer, "%s model\n", m->model->traits.title));
   /* Models of bodies take no solutions: there is no training error. */

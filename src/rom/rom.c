@@ -35,12 +35,13 @@ PetscErrorCode HycoROMClone(HycoROM m, HycoROM *clone)
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  HycoCheckGiven(clone);
   PetscCall(CreateHandle(&c));
   c->model = m->model;
   /* Counted without a lock: clones are for one thread or rank each, as PETSc's objects are. */
   c->model->references++;
   *c->ops = *m->ops;
-  PetscCall(PetscObjectSetOptions((PetscObject)c, ((PetscObject)m)->options));
+  PetscCall(HycoOptionsInherit((PetscObject)c, (PetscObject)m));
   c->full_order = m->full_order;
   c->full_displacement = m->full_displacement;
   c->wants_equilibrium = m->wants_equilibrium;
@@ -108,10 +109,10 @@ PetscErrorCode HycoROMDeclare(PetscOptions options)
 }
 
 HycoDefineMethod(HycoROMGetFallback, (HycoROM m, PetscBool *full_order, PetscBool *displacement), m, HYCO_ROM_CLASSID,
-                 *full_order = m->full_order;
-                 *displacement = m->full_displacement)
+                 HycoCheckGiven(full_order);
+                 HycoCheckGiven(displacement); *full_order = m->full_order; *displacement = m->full_displacement)
 
-HycoDefineMethod(HycoROMWantsEquilibrium, (HycoROM m, PetscBool *wants), m, HYCO_ROM_CLASSID,
+HycoDefineMethod(HycoROMWantsEquilibrium, (HycoROM m, PetscBool *wants), m, HYCO_ROM_CLASSID, HycoCheckGiven(wants);
                  *wants = m->wants_equilibrium)
 
 /* The last handle frees the model. */
@@ -148,8 +149,9 @@ PetscErrorCode HycoROMDestroy(HycoROM *model)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-HycoDefineMethod(HycoROMGetType, (HycoROM m, HycoROMType *type), m, HYCO_ROM_CLASSID, *type = m->model->type)
-HycoDefineMethod(HycoROMGivesForces, (HycoROM m, PetscBool *gives), m, HYCO_ROM_CLASSID,
+HycoDefineMethod(HycoROMGetType, (HycoROM m, HycoROMType *type), m, HYCO_ROM_CLASSID, HycoCheckGiven(type);
+                 *type = m->model->type)
+HycoDefineMethod(HycoROMGivesForces, (HycoROM m, PetscBool *gives), m, HYCO_ROM_CLASSID, HycoCheckGiven(gives);
                  *gives = m->model->traits.forces)
 
 PetscErrorCode HycoROMGetDimensions(HycoROM m, PetscInt *n_modes, PetscInt *n_contacts)
@@ -221,7 +223,8 @@ PetscErrorCode HycoROMSetFE(HycoROM m, HycoHybrid hybrid, PetscInt n, const Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-HycoDefineMethod(HycoROMGetScene, (HycoROM m, HycoScene *scene), m, HYCO_ROM_CLASSID, *scene = m->model->scene)
+HycoDefineMethod(HycoROMGetScene, (HycoROM m, HycoScene *scene), m, HYCO_ROM_CLASSID, HycoCheckGiven(scene);
+                 *scene = m->model->scene)
 
 /* The history first, whose message says what differs; the fingerprint covers all else. */
 PetscErrorCode HycoROMCheckScene(HycoROM m, HycoScene scene)

@@ -562,7 +562,7 @@ static PetscErrorCode Load(HycoH5 *h, const char path[], HycoROM *model)
   PetscCall(HycoLogEvent(HYCO_EVENT_LOAD, PETSC_FALSE));
   PetscCall(HycoH5Close(h, PETSC_FALSE));
   /* The scene in the file has a hyco: section: its options hold unless the command line differs. */
-  if (!ierr) ierr = PetscObjectSetOptions((PetscObject)m, m->model->scene->options);
+  if (!ierr) ierr = HycoSceneGiveOptions(m->model->scene, (PetscObject)m);
   if (!ierr) ierr = HycoROMSetFromOptions(m);
   /* The first error is the one to report. */
   if (ierr) (void)!HycoROMDestroy(&m);

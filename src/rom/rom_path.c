@@ -238,6 +238,7 @@ static PetscErrorCode CheckPath(HycoROM m, const char what[])
 PetscErrorCode HycoROMGetHistory(HycoROM m, HycoHistory *history)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(history);
   PetscCall(CheckPath(m, "HycoROMGetHistory()"));
   PetscCall(HycoROMMeasurePath(m));
   *history = m->trace.history;

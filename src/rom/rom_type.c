@@ -24,6 +24,7 @@ PetscErrorCode HycoROMSetType(HycoROM m, HycoROMType type)
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  HycoCheckGiven(type);
   PetscCall(HycoRegistryFind(&types, type, &create));
   HycoCheck(
       create || strcmp(type, former),
@@ -45,7 +46,9 @@ PetscErrorCode HycoROMSetType(HycoROM m, HycoROMType type)
 }
 
 HycoDefineMethod(HycoROMSetOps, (HycoROM m, const HycoROMOps *ops, const HycoROMTraits *traits, void *data), m,
-                 HYCO_ROM_CLASSID, *m->ops = *ops;
-                 m->model->traits = *traits; m->model->data = data)
-HycoDefineMethod(HycoROMGetData, (HycoROM m, void *data), m, HYCO_ROM_CLASSID, *(void **)data = m->model->data)
-HycoDefineMethod(HycoROMGetWork, (HycoROM m, void *work), m, HYCO_ROM_CLASSID, *(void **)work = m->work)
+                 HYCO_ROM_CLASSID, HycoCheckGiven(ops);
+                 HycoCheckGiven(traits); *m->ops = *ops; m->model->traits = *traits; m->model->data = data)
+HycoDefineMethod(HycoROMGetData, (HycoROM m, void *data), m, HYCO_ROM_CLASSID, HycoCheckGiven(data);
+                 *(void **)data = m->model->data)
+HycoDefineMethod(HycoROMGetWork, (HycoROM m, void *work), m, HYCO_ROM_CLASSID, HycoCheckGiven(work);
+                 *(void **)work = m->work)

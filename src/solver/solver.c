@@ -36,6 +36,7 @@ static const char *const form_names[] = {"", "dual", "primal", "dual_free"};
 PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(solver);
   PetscCall(HycoPackageCheck());
   PetscCall(PetscHeaderCreate(*solver, HYCO_SOLVER_CLASSID, "HycoSolver", "Solver of contact systems", "Hyco", comm,
                               HycoSolverDestroy, HycoSolverView));
@@ -87,6 +88,7 @@ PetscErrorCode HycoSolverSetType(HycoSolver s, HycoSolverType type)
 {
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
+  HycoCheckGiven(type);
   for (PetscInt k = 0; HycoSolverTypes[k]; k++) {
     PetscBool same;
 
@@ -178,17 +180,19 @@ static PetscErrorCode ReadForm(HycoSolver s, HycoOptionItems PetscOptionsObject)
 }
 
 /* -hyco_tao_type: one of TAO's types that are suitable for contact, or one that the program registers. */
-static PetscErrorCode ReadTaoType(HycoSolver s, HycoOptionItems PetscOptionsObject)
+static PetscErrorCode ReadTaoType(HycoSolver s, HycoOptionItems PetscOptionsObject, PetscBool typed)
 {
   char type[HYCO_TAO_NAME] = "", list[HYCO_LINE];
   PetscBool given;
 
   PetscFunctionBegin;
-  PetscCall(HycoOptionsString("-hyco_tao_type",
-                              "<gpcg|tron|...|ssils|...> solver of the type tao, see docs/solvers.md (-hyco_tao_... "
-                              "sets its own options) [gpcg; ssils if nonsymmetric]",
-                              type, sizeof(type), &given));
+  PetscCall(HycoOptionsString(
+      "-hyco_tao_type",
+      "<gpcg|tron|...|ssils|...> solver of the type tao, which it implies, see docs/solvers.md (-hyco_tao_... "
+      "sets its own options) [gpcg; ssils if nonsymmetric]",
+      type, sizeof(type), &given));
   if (!given) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!typed) s->type = TAO;
   /* An option without effect is an error. */
   HycoCheck(s->type == TAO,
             "-hyco_tao_type has no effect here, because the solver type is %s; give -hyco_solver_type tao",
@@ -207,6 +211,7 @@ PetscErrorCode HycoSolverSetFromOptions(HycoSolver s)
 {
   PetscInt linear;
   PetscReal gigabytes;
+  PetscBool typed;
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
@@ -217,8 +222,8 @@ PetscErrorCode HycoSolverSetFromOptions(HycoSolver s)
   PetscCall(
       HycoOptionsWord("-hyco_solver_type",
                       "method for every contact problem (for a model active_set is used if a TAO type needs symmetry)",
-                      HycoSolverTypes, &s->type, NULL));
-  PetscCall(ReadTaoType(s, PetscOptionsObject));
+                      HycoSolverTypes, &s->type, &typed));
+  PetscCall(ReadTaoType(s, PetscOptionsObject, typed));
   PetscCall(HycoOptionsFor("full order"));
   PetscCall(ReadForm(s, PetscOptionsObject));
   PetscCall(HycoOptionsWord("-hyco_linear",
@@ -377,6 +382,31 @@ static PetscErrorCode FirstForm(HycoSolver s, HycoSolverForm *form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoSolverNoteKSP(HycoSolver s, KSP ksp)
+{
+  KSPConvergedReason reason;
+  const char *prefix;
+  PetscInt its;
+
+  PetscFunctionBegin;
+  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  PetscCall(KSPGetIterationNumber(ksp, &its));
+  PetscCall(KSPGetOptionsPrefix(ksp, &prefix));
+  if (reason < 0)
+    HycoFormat(s->failure, "its KSP (-%sksp_...) ended by %s after %d iterations", prefix ? prefix : "",
+               KSPConvergedReasons[reason], (int)its);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoSolverExplain(HycoSolver s, char why[HYCO_LINE])
+{
+  char text[HYCO_LINE];
+
+  if (!s->failure[0] || !why[0] || s->reason >= 0) return;
+  HycoFormat(text, "%.400s: %.500s", s->reason == HYCO_DIVERGED_SINGULAR ? "not converged" : why, s->failure);
+  snprintf(why, HYCO_LINE, "%s", text);
+}
+
 /* The reason follows from the recomputed residuals alone; `solved` only distinguishes the text of a failure. */
 static PetscErrorCode Judge(HycoSolver s, Vec x, Vec L, PetscBool solved)
 {
@@ -384,7 +414,7 @@ static PetscErrorCode Judge(HycoSolver s, Vec x, Vec L, PetscBool solved)
   HycoLogged(HYCO_EVENT_KKT, HycoSystemComputeKKT(s->system, x, L, &s->kkt));
   if (HycoKKTMax(&s->kkt) <= s->rtol)
     s->reason = HYCO_CONVERGED;
-  else if (s->by_factor && !(s->kkt.stationarity <= 1e-3))
+  else if (s->by_factor && !s->failure[0] && !(s->kkt.stationarity <= 1e-3))
     s->reason = HYCO_DIVERGED_SINGULAR; /* K x = r was solved with a large residual */
   else if (s->reason != HYCO_DIVERGED_SINGULAR)
     s->reason = solved || s->kkt.stationarity > s->rtol ? HYCO_DIVERGED_RESIDUAL : HYCO_DIVERGED_ITERATIONS;
@@ -404,7 +434,10 @@ static PetscErrorCode Attempt(HycoSolver s, HycoSolverForm form, Vec x, Vec L)
   /* For forms that say nothing: Judge() decides by the residuals. */
   s->reason = HYCO_DIVERGED_RESIDUAL;
   s->by_factor = PETSC_TRUE;
+  s->failure[0] = '\0';
   PetscCall(form->ops->solve(s, form, x, L, &solved));
+  if (!s->failure[0] && !solved && s->now.traits && !(s->now.traits & HYCO_TAO_OWN))
+    PetscCall(PetscStrncpy(s->failure, HycoTaoFailure(), sizeof(s->failure)));
   PetscCall(Judge(s, x, L, solved));
   s->its += its;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -623,11 +656,18 @@ PetscErrorCode HycoSolverGetLinearIterations(HycoSolver s, PetscInt *its, PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-HycoDefineMethod(HycoSolverGetReason, (HycoSolver s, HycoReason *reason), s, HYCO_SOLVER_CLASSID, *reason = s->reason)
-HycoDefineMethod(HycoSolverGetIterations, (HycoSolver s, PetscInt *its), s, HYCO_SOLVER_CLASSID, *its = s->its)
-HycoDefineMethod(HycoSolverGetKKT, (HycoSolver s, HycoKKT *kkt), s, HYCO_SOLVER_CLASSID, *kkt = s->kkt)
-HycoDefineMethod(HycoSolverGetMethod, (HycoSolver s, const char *method[]), s, HYCO_SOLVER_CLASSID, *method = s->method)
+HycoDefineMethod(HycoSolverGetReason, (HycoSolver s, HycoReason *reason), s, HYCO_SOLVER_CLASSID,
+                 HycoCheckGiven(reason);
+                 *reason = s->reason)
+HycoDefineMethod(HycoSolverGetIterations, (HycoSolver s, PetscInt *its), s, HYCO_SOLVER_CLASSID, HycoCheckGiven(its);
+                 *its = s->its)
+HycoDefineMethod(HycoSolverGetKKT, (HycoSolver s, HycoKKT *kkt), s, HYCO_SOLVER_CLASSID, HycoCheckGiven(kkt);
+                 *kkt = s->kkt)
+HycoDefineMethod(HycoSolverGetMethod, (HycoSolver s, const char *method[]), s, HYCO_SOLVER_CLASSID,
+                 HycoCheckGiven(method);
+                 *method = s->method)
 HycoDefineMethod(HycoSolverGetLinear, (HycoSolver s, const char *linear[]), s, HYCO_SOLVER_CLASSID,
+                 HycoCheckGiven(linear);
                  *linear = s->linear_method)
 
 /* Of the last solve: the factor's part is 0 if it was kept. */

@@ -5,6 +5,7 @@
 PetscErrorCode HycoSystemCreate(MPI_Comm comm, HycoSystem *system)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(system);
   PetscCall(HycoPackageCheck());
   PetscCall(PetscHeaderCreate(*system, HYCO_SYSTEM_CLASSID, "HycoSystem", "Contact system", "Hyco", comm,
                               HycoSystemDestroy, HycoSystemView));
@@ -53,6 +54,7 @@ PetscErrorCode HycoSystemSetMatrices(HycoSystem s, Mat K, Mat Bt, Mat B, PetscBo
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SYSTEM_CLASSID);
+  HycoCheckGiven(K);
   PetscCall(MatGetSize(K, &rows, &cols));
   PetscCheck(rows == cols, PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ, "K is %d x %d; it must be square", (int)rows, (int)cols);
   PetscCheck(!B == !Bt, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG, "B and Bt must both be given, or neither");
@@ -97,6 +99,7 @@ PetscErrorCode HycoSystemSetVectors(HycoSystem s, Vec F, Vec D)
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SYSTEM_CLASSID);
+  HycoCheckGiven(F);
   PetscCall(VecGetSize(F, &n));
   if (D) PetscCall(VecGetSize(D, &m));
   PetscCheck(s->K, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoSystemSetMatrices() before HycoSystemSetVectors()");
@@ -136,6 +139,8 @@ PetscErrorCode HycoSystemSetFlexibility(HycoSystem s, Mat G, Vec g)
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SYSTEM_CLASSID);
+  HycoCheckGiven(G);
+  HycoCheckGiven(g);
   PetscCall(PetscObjectTypeCompare((PetscObject)G, MATSEQDENSE, &dense));
   PetscCall(MatGetSize(G, &rows, &cols));
   PetscCall(VecGetSize(g, &m));
@@ -481,6 +486,7 @@ PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SYSTEM_CLASSID);
+  HycoCheckGiven(kkt);
   PetscCall(PetscMemzero(kkt, sizeof(*kkt)));
   PetscCall(HycoSystemCheckBlocks(s));
   if (s->G) {

@@ -77,6 +77,32 @@ PetscErrorCode HycoViewBegin_Private(PetscObject object, PetscViewer *viewer, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The global database first: a caller's option is there, and an object's own may be a scene's. */
+PetscErrorCode HycoViewFromOptions_Private(PetscObject object, PetscObject owner, const char option[])
+{
+  const PetscOptions own = object->options;
+  PetscBool global;
+  PetscErrorCode caught;
+  char why[HYCO_LINE];
+
+  PetscFunctionBegin;
+  HycoCheckGiven(option);
+  PetscCall(PetscOptionsHasName(NULL, owner ? owner->prefix : object->prefix, option, &global));
+  if (global) object->options = NULL;
+  HycoCatch(PetscObjectViewFromOptions(object, owner, option), caught, why);
+  object->options = own;
+  HycoCheck(!caught, "%s: %s", option, why);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoOptionsInherit(PetscObject object, PetscObject from)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscObjectSetOptions(object, from->options));
+  PetscCall(PetscObjectSetOptionsPrefix(object, from->prefix));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFreeAll_Private(void *const addresses[])
 {
   PetscFunctionBegin;

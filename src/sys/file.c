@@ -267,6 +267,7 @@ PetscErrorCode HycoFileComplain(const char shown[], int failed)
 PetscErrorCode HycoFileFlush(HycoFile file)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(file);
   PetscCall(HycoFileComplain(file->shown, Flush(file)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -275,7 +276,7 @@ PetscErrorCode HycoFileFlush(HycoFile file)
    too: the last bytes are written there. */
 PetscErrorCode HycoFileClose(HycoFile *file, PetscBool commit)
 {
-  HycoFile f = *file;
+  HycoFile f = file ? *file : NULL;
   char shown[HYCO_FILE_NAME];
   int failed;
 

@@ -323,10 +323,12 @@ PetscErrorCode HycoH5OpenOr(const char path[], const char remedy[], HycoH5 *file
 /* The caller frees *image. The first call gives the size. */
 PetscErrorCode HycoH5GetImage(HycoH5 f, void **image, size_t *size)
 {
-  ssize_t bytes = H5Fflush(f->id, H5F_SCOPE_GLOBAL) < 0 ? -1 : H5Fget_file_image(f->id, NULL, 0);
+  ssize_t bytes;
   PetscBool made;
 
   PetscFunctionBegin;
+  HycoCheckGiven(f);
+  bytes = H5Fflush(f->id, H5F_SCOPE_GLOBAL) < 0 ? -1 : H5Fget_file_image(f->id, NULL, 0);
   HycoCheck(bytes >= 0, "%s could not be written: HDF5 has no image of it in memory", f->path);
   PetscCall(PetscMalloc((size_t)bytes, image));
   made = (PetscBool)(H5Fget_file_image(f->id, *image, (size_t)bytes) >= 0);
@@ -425,7 +427,7 @@ static PetscErrorCode CloseShared(HycoH5 f, PetscBool commit)
 /* Frees *file on errors too, and sets it to NULL. commit false: nothing stays on the disk. */
 PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit)
 {
-  HycoH5 f = *file;
+  HycoH5 f = file ? *file : NULL;
   HycoFile out;
   PetscErrorCode ierr;
 
@@ -448,7 +450,7 @@ PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit)
 
 PetscReal HycoH5Written(HycoH5 f)
 {
-  return (PetscReal)f->written;
+  return f ? (PetscReal)f->written : 0;
 }
 
 /* The number of bytes of a row. HYCO_H5_LINE is a dataset of one dimension. */
@@ -558,6 +560,7 @@ PetscErrorCode HycoH5WriteRows(HycoH5 f, const char name[], MPI_Datatype type, P
   long long place = 0;
 
   PetscFunctionBegin;
+  HycoCheckGiven(f);
   if (!f->shared) {
     PetscCall(Write(f, name, NumberType(type), rows, cols, first, n, data));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -572,6 +575,7 @@ PetscErrorCode HycoH5WriteRows(HycoH5 f, const char name[], MPI_Datatype type, P
 PetscErrorCode HycoH5WriteReal(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const PetscReal *data)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(file);
   PetscCall(Write(file, name, NumberType(MPIU_REAL), rows, cols, 0, rows, data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -580,6 +584,7 @@ PetscErrorCode HycoH5WriteReal(HycoH5 file, const char name[], PetscInt rows, Pe
 PetscErrorCode HycoH5WriteSingle(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const float *data)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(file);
   PetscCall(Write(file, name, H5T_NATIVE_FLOAT, rows, cols, 0, rows, data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -587,6 +592,7 @@ PetscErrorCode HycoH5WriteSingle(HycoH5 file, const char name[], PetscInt rows, 
 PetscErrorCode HycoH5WriteInt(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const PetscInt *data)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(file);
   PetscCall(Write(file, name, NumberType(MPIU_INT), rows, cols, 0, rows, data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -595,6 +601,7 @@ PetscErrorCode HycoH5WriteInt(HycoH5 file, const char name[], PetscInt rows, Pet
 PetscErrorCode HycoH5WriteText(HycoH5 file, const char name[], const char text[])
 {
   PetscFunctionBegin;
+  HycoCheckGiven(file);
   PetscCall(Write(file, name, H5T_NATIVE_CHAR, (PetscInt)strlen(text), 1, 0, (PetscInt)strlen(text), text));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -623,6 +630,7 @@ PetscErrorCode HycoH5WriteAttribute(HycoH5 f, const char at[], const char name[]
   hid_t space = H5Screate(H5S_SCALAR), type = H5Tcopy(H5T_C_S1);
 
   PetscFunctionBegin;
+  HycoCheckGiven(f);
   H5Tset_size(type, PetscMax(strlen(text), 1));
   H5Tset_strpad(type, H5T_STR_NULLPAD);
   HycoFinally(WriteAttribute(f, at, name, type, space, text), H5Tclose(type); H5Sclose(space));
@@ -636,6 +644,7 @@ PetscErrorCode HycoH5WriteAttributeInt(HycoH5 f, const char at[], const char nam
   hid_t space = n == 1 ? H5Screate(H5S_SCALAR) : H5Screate_simple(1, &size, NULL);
 
   PetscFunctionBegin;
+  HycoCheckGiven(f);
   HycoFinally(WriteAttribute(f, at, name, NATIVE_INT, space, value), H5Sclose(space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -712,7 +721,7 @@ static PetscErrorCode CheckSize(HycoH5 f, const char name[], const hsize_t dims[
 /* H5Lexists() fails, and is no error, if a folder of the name is missing. */
 PetscBool HycoH5Has(HycoH5 file, const char name[])
 {
-  return (PetscBool)(H5Lexists(file->id, name, file->access) > 0);
+  return (PetscBool)(file && name && H5Lexists(file->id, name, file->access) > 0);
 }
 
 /* From the header of a dataset of reals: nothing is read. */
@@ -722,6 +731,7 @@ PetscErrorCode HycoH5GetSize(HycoH5 file, const char name[], PetscInt *rows, Pet
   hsize_t dims[2];
 
   PetscFunctionBegin;
+  HycoCheckGiven(file);
   PetscCall(OpenSet(file, name, H5T_FLOAT, &set, dims));
   H5Dclose(set);
   *rows = (PetscInt)dims[0];
@@ -746,6 +756,7 @@ PetscErrorCode HycoH5ReadReal(HycoH5 file, const char name[], PetscInt rows, Pet
   hsize_t dims[2];
 
   PetscFunctionBegin;
+  HycoCheckGiven(file);
   PetscCall(OpenSet(file, name, H5T_FLOAT, &set, dims));
   PetscCall(CheckSize(file, name, dims, rows, cols));
   PetscCall(ReadSet(file, name, set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, data));
@@ -775,6 +786,7 @@ static PetscErrorCode LoadSet(HycoH5 f, const char name[], H5T_class_t class, hi
 PetscErrorCode HycoH5LoadReal(HycoH5 file, const char name[], PetscInt *rows, PetscInt *cols, PetscReal **data)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(file);
   PetscCall(LoadSet(file, name, H5T_FLOAT, H5T_NATIVE_DOUBLE, sizeof(PetscReal), rows, cols, data));
   HycoOnError(CheckFinite(file, name, (size_t)*rows * (size_t)*cols, *data), PetscCall(PetscFree(*data)));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -785,6 +797,7 @@ PetscErrorCode HycoH5LoadInt(HycoH5 file, const char name[], PetscInt lo, PetscI
                              PetscInt **data)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(file);
   PetscCall(LoadSet(file, name, H5T_INTEGER, NATIVE_INT, sizeof(PetscInt), rows, cols, data));
   for (size_t k = 0; k < (size_t)*rows * (size_t)*cols; k++) {
     const PetscInt value = (*data)[k];
@@ -805,6 +818,7 @@ PetscErrorCode HycoH5ReadRows(HycoH5 file, const char name[], PetscInt start, Pe
   hsize_t dims[2], offset[2] = {(hsize_t)start, 0}, count[2] = {(hsize_t)n, (hsize_t)cols};
 
   PetscFunctionBegin;
+  HycoCheckGiven(file);
   if (n == 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(OpenSet(file, name, H5T_FLOAT, &set, dims));
   PetscCall(CheckSize(file, name, dims, -1, cols));
@@ -824,6 +838,7 @@ PetscErrorCode HycoH5LoadText(HycoH5 file, const char name[], char **text)
   PetscInt length = -1, one = 1;
 
   PetscFunctionBegin;
+  HycoCheckGiven(file);
   PetscCall(LoadSet(file, name, H5T_INTEGER, H5T_NATIVE_CHAR, 1, &length, &one, text));
   (*text)[length] = '\0';
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -831,13 +846,14 @@ PetscErrorCode HycoH5LoadText(HycoH5 file, const char name[], char **text)
 
 PetscBool HycoH5Reads(HycoH5 file)
 {
-  return file->reads;
+  return (PetscBool)(file && file->reads);
 }
 
 /* One function reads and writes, so that both directions of a format are the same code; see HycoH5Reads(). */
 PetscErrorCode HycoH5Real(HycoH5 file, const char name[], PetscInt *rows, PetscInt cols, PetscReal **data)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(file);
   PetscCall(file->reads ? HycoH5LoadReal(file, name, rows, &cols, data)
                         : HycoH5WriteReal(file, name, *rows, cols, *data));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -849,6 +865,7 @@ PetscErrorCode HycoH5Int(HycoH5 file, const char name[], PetscInt lo, PetscInt h
                          PetscInt **data)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(file);
   PetscCall(file->reads ? HycoH5LoadInt(file, name, lo, hi, rows, &cols, data)
                         : HycoH5WriteInt(file, name, *rows, cols, *data));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -857,6 +874,7 @@ PetscErrorCode HycoH5Int(HycoH5 file, const char name[], PetscInt lo, PetscInt h
 PetscErrorCode HycoH5Reals(HycoH5 file, const char name[], PetscInt n, PetscReal data[])
 {
   PetscFunctionBegin;
+  HycoCheckGiven(file);
   PetscCall(file->reads ? HycoH5ReadReal(file, name, n, 1, data) : HycoH5WriteReal(file, name, n, 1, data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -868,6 +886,7 @@ PetscErrorCode HycoH5Ints(HycoH5 file, const char name[], PetscInt lo, PetscInt 
   PetscInt *read = data;
 
   PetscFunctionBegin;
+  HycoCheckGiven(file);
   PetscCall(HycoH5Int(file, name, lo, hi, &n, 1, &read));
   if (!file->reads) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscArraycpy(data, read, n));
@@ -882,6 +901,7 @@ PetscErrorCode HycoH5Starts(HycoH5 file, const char name[], PetscInt n, PetscInt
   PetscInt rows = n + 1;
 
   PetscFunctionBegin;
+  HycoCheckGiven(file);
   PetscCall(HycoH5Int(file, name, 0, PETSC_MAX_INT, &rows, 1, start));
   for (PetscInt k = 0; k < n; k++)
     HycoCheck((*start)[0] == 0 && (*start)[k] <= (*start)[k + 1], "%s: %s is damaged", file->path, name);

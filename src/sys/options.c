@@ -108,6 +108,49 @@ const HycoOption *HycoOptionFind(const char name[])
   return HycoOptionListFind(&table, name);
 }
 
+static PetscErrorCode (*probe_all)(const char[]) = NULL;
+
+void HycoOptionsSetProbe(PetscErrorCode (*probe)(const char name[]))
+{
+  probe_all = probe;
+}
+
+/* With a database of this option alone, which nothing else can read. Those that print, and options of solvers inside others, are read late: they
+   count as read, as does one whose value is refused. */
+PetscErrorCode HycoOptionsOfSolver(const char name[], PetscBool *prefix, PetscBool *reads)
+{
+  static const char *const prefixes[] = {"hyco_mumps_",   "hyco_primal_", "hyco_norm_",   "hyco_tao_",
+                                         "hyco_pod_svd_", "hyco_pod_bv_", "hyco_pod_ds_", NULL};
+  static const char *const late[] = {"view", "monitor", "reason", "error", "_mg_", "_sub_", "_pod_", "_norm_", NULL};
+  char dashed[HYCO_LINE], why[HYCO_LINE], **names, **values;
+  PetscOptions alone;
+  PetscErrorCode caught;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  *prefix = *reads = PETSC_FALSE;
+  for (PetscInt k = 0; prefixes[k] && !*prefix; k++)
+    *prefix = (PetscBool)(strncasecmp(name, prefixes[k], strlen(prefixes[k])) == 0);
+  for (PetscInt k = 0; late[k] && *prefix; k++) *reads = (PetscBool)(*reads || strstr(name, late[k]));
+  if (!*prefix || *reads || !probe_all) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", name));
+  PetscCall(PetscOptionsCreate(&alone));
+  PetscCall(PetscOptionsSetValue(alone, dashed, NULL));
+  /* Its value from the unread ones: to look it up would mark it as read. */
+  PetscCall(PetscOptionsLeftGet(NULL, &n, &names, &values));
+  for (PetscInt k = 0; k < n; k++) {
+    if (strcasecmp(names[k], name) == 0) PetscCall(PetscOptionsSetValue(alone, dashed, values[k]));
+  }
+  PetscCall(PetscOptionsLeftRestore(NULL, &n, &names, &values));
+  PetscCall(PetscOptionsPush(alone));
+  HycoCatch((*probe_all)(name), caught, why);
+  PetscCall(PetscOptionsPop());
+  PetscCall(PetscOptionsUsed(alone, name, reads));
+  if (caught) *reads = PETSC_TRUE;
+  PetscCall(PetscOptionsDestroy(&alone));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Options of earlier versions are named with their successors, instead of having no effect. */
 PetscErrorCode HycoOptionsCheckName(const char name[])
 {

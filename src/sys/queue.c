@@ -93,7 +93,7 @@ PetscErrorCode HycoQueueCreate(MPI_Comm comm, PetscInt n_groups, PetscInt n, con
 /* Collective: freeing a window waits for all ranks. */
 PetscErrorCode HycoQueueDestroy(HycoQueue *queue)
 {
-  HycoQueue q = *queue;
+  HycoQueue q = queue ? *queue : NULL;
 
   PetscFunctionBegin;
   if (!q) PetscFunctionReturn(PETSC_SUCCESS);
@@ -111,6 +111,7 @@ PetscErrorCode HycoQueueDestroy(HycoQueue *queue)
 PetscErrorCode HycoQueueGetGroup(HycoQueue q, MPI_Comm *group)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(q);
   *group = q->group;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -181,6 +182,7 @@ static PetscErrorCode TakeTask(HycoQueue q, PetscInt *task)
 PetscErrorCode HycoQueueTake(HycoQueue q, PetscInt *task)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(q);
   if (q->rank == 0 || q->window == MPI_WIN_NULL) PetscCall(TakeTask(q, task));
   PetscCallMPI(MPI_Bcast(task, 1, MPIU_INT, 0, q->group));
   q->n_taken += q->busy;
@@ -191,6 +193,7 @@ PetscErrorCode HycoQueueTake(HycoQueue q, PetscInt *task)
 PetscErrorCode HycoQueueDone(HycoQueue q, PetscInt *n)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(q);
   PetscCall(Add(q, DONE, 0, n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -199,6 +202,7 @@ PetscErrorCode HycoQueueDone(HycoQueue q, PetscInt *n)
 PetscErrorCode HycoQueueNumber(HycoQueue q, PetscInt *number, PetscInt *group)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(q);
   PetscCall(Add(q, EVENTS, 1, number));
   ++*number;
   *group = q->color;
@@ -211,6 +215,7 @@ PetscErrorCode HycoQueueServe(HycoQueue q)
   int found;
 
   PetscFunctionBegin;
+  HycoCheckGiven(q);
   if (q->window != MPI_WIN_NULL)
     PetscCallMPI(MPI_Iprobe(MPI_ANY_SOURCE, MPI_ANY_TAG, q->group, &found, MPI_STATUS_IGNORE));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -223,6 +228,7 @@ PetscErrorCode HycoQueueHear(HycoQueue q)
   PetscInt failed = 0;
 
   PetscFunctionBegin;
+  HycoCheckGiven(q);
   if (q->rank == 0) PetscCall(Add(q, FAILED, 0, &failed));
   PetscCallMPI(MPI_Bcast(&failed, 1, MPIU_INT, 0, q->group));
   q->told = (PetscBool)(failed > 0);
@@ -236,6 +242,7 @@ PetscErrorCode HycoQueueEnd(HycoQueue q, PetscErrorCode error)
   PetscInt before;
 
   PetscFunctionBegin;
+  HycoCheckGiven(q);
   if (!error || q->told) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Add(q, FAILED, 1, &before));
   PetscCall(error);
@@ -246,6 +253,7 @@ PetscErrorCode HycoQueueEnd(HycoQueue q, PetscErrorCode error)
 PetscErrorCode HycoQueueLeft(HycoQueue q, PetscInt *n)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(q);
   PetscCallMPI(MPI_Allreduce(&q->n_left, n, 1, MPIU_INT, MPI_MAX, q->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -256,6 +264,7 @@ PetscErrorCode HycoQueueCount(HycoQueue q, PetscInt *n_groups, PetscInt done[])
   PetscInt *count;
 
   PetscFunctionBegin;
+  HycoCheckGiven(q);
   PetscCall(PetscCalloc1(q->n_groups, &count));
   if (q->rank == 0) count[q->color] = q->n_taken;
   HycoAllreduce(count, q->n_groups, MPIU_INT, MPI_SUM, q->comm);

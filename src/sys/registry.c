@@ -54,6 +54,8 @@ static PetscErrorCode Begin(HycoRegistry *r)
 PetscErrorCode HycoRegistryAdd(HycoRegistry *r, const char name[], HycoVoidFn *create)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(name);
+  HycoCheckGiven(create);
   PetscCall(Begin(r));
   PetscCall(Add(r, name, create));
   PetscCall(HycoOptionsForgetTable());

@@ -116,6 +116,49 @@ class Entries(Case):
             finally:
                 os.remove(self.path(name))
 
+    def test_petsc_options(self):
+        """Options of PETSc: those that no solver in hyco has are refused before a solve, in each command; those that only this run does not read after
+        its results are written. PETSc's own, prefixes, the environment and a scene's options of solvers behave as in PETSc."""
+        shutil.copytree(ROPE, self.path('rope'), dirs_exist_ok=True)
+        solve, grid = ('solve', '-scene', 'rope', '-mu', '0.07,0.17', '-report', 'r.json'), ('-scene', 'rope', '-grid', '3,3')
+
+        def run(args, *more, status=0, word='', written=True, **environment):
+            if os.path.exists(self.path('r.json')):
+                os.remove(self.path('r.json'))
+            done = subprocess.run([HYCO, *args, *more], cwd=self.folder, env={**os.environ, 'HOME': self.path('home'), **environment}, capture_output=True,
+                                  text=True, check=False, timeout=100 * PATIENCE)
+            self.assertEqual(done.returncode, status, (more, done.stderr))
+            self.assertEqual(done.stderr.count('hyco: error'), status, done.stderr)
+            self.assertIn(word, done.stdout + done.stderr)
+            self.assertEqual(os.path.exists(self.path('r.json')), written, more)
+            return done.stdout
+
+        for option in ('-ksp_monitor', '-tao_monitor', '-hyco_tao_foo', '-hyco_mumps_icntl_99', '-hyco_primal_ksp_foo'):
+            run(solve, option, status=1, word=option, written=False)
+        for option in ('-hyco_tao_foo', '-hyco_mumps_icntl_99'):
+            run(('train', *grid, '-model', 'm.h5', '-report', 'r.json'), option, '3', status=1, word=option, written=False)
+            run(('check', *grid, '-report', 'r.json'), option, '3', status=1, word=option, written=False)
+            self.assertFalse(os.path.exists(self.path('m.h5')))
+        run(solve, '-hyco_mumps_icntl_14', '90', status=1, word='-hyco_mumps_icntl_14')  # a small matrix: no MUMPS
+        run(('check', *grid, '-report', 'r.json'), '-hyco_mumps_icntl_14', '90')
+        run(solve, '-options_view', word='-mu 0.07,0.17')
+        run(solve, '-options_left', word='no unused options')
+        run(solve, '-citations', word='petsc')
+        run(solve, '-prefix_push', 'hyco_solver_', '-max_its', '50', '-prefix_push', 'warm_', '-start', '0', '-prefix_pop', '-prefix_pop')
+        run(solve, '-prefix_push', 'hyco_solver_', '-maxits', '5', '-prefix_pop', status=1, word='-hyco_solver_max_its', written=False)
+        run(solve, PETSC_OPTIONS='-ksp_monitor -hyco_pod_svd_view')
+        run(solve, PETSC_OPTIONS='-hyco_pod_tool 1', status=1, word='hyco_pod_tool', written=False)
+        run(solve, '-hyco_solver_view', 'foo:bar', status=1, word='-hyco_solver_view', written=False)
+        run(solve, '-hyco_tao_type', 'tron', '-hyco_tao_ksp_monitor', '-hyco_solver_form', 'dual', word='Residual norm')
+        run(solve, '-hyco_tao_type', 'gpcg', '-hyco_tao_ksp_type', 'stcg', '-hyco_solver_form', 'dual')
+        run(solve, '-hyco_tao_type', 'gpcg', '-hyco_tao_ksp_type', 'foo', '-hyco_solver_form', 'dual', status=1, word='foo', written=False)
+        with open(self.path('rope', 'scene.yaml'), 'a', encoding='utf-8') as file:
+            file.write('hyco: {mumps_icntl_14: 100}\n')
+        run(solve)
+        with open(self.path('rope', 'scene.yaml'), 'a', encoding='utf-8') as file:
+            file.write('hyco_mumps_icntl_99: 1\n')
+        run(solve, status=1, word='hyco_mumps_icntl_99', written=False)
+
     def test_little_memory(self):
         """Too little address space for BLAS: a clear error, where OpenBLAS would try without end. The amount depends on the libraries."""
         failed = 0

@@ -65,7 +65,7 @@ CASES = [
     (['solve', *R, *N, '-table', 'out.csv'], 'the option -mu has no effect'),
     (['predict', '-model', 'rope.h5', *N, '-table', 'out.csv', '-output', 'out.xdmf', '-hyco_fallback', '-scene', ROPE, '-target_u', '1e-2'],
      'works without -hyco_fallback only'),
-    (['solve', *R, '-hyco_tao_type', 'gpcg'], '-hyco_tao_type has no effect here, because the solver type is active_set'),
+    (['solve', *R, '-hyco_solver_type', 'active_set', '-hyco_tao_type', 'gpcg'], '-hyco_tao_type has no effect here, because the solver type is active_set'),
     (['train', *T, *N, '-validation_grid', '2,2', '-validation_points', 'p.csv', '-target_u', '1e-2'], 'there are two sets of held-out points'),
     (['train', *T, *N, '-validation_grid', '2,2', '-grid_type', 'centred'], 'is also a training point'),
     (['train', *T, '-greedy', '-training_grid', '3,3', '-target_u', '1e-2'], 'for train -greedy use -target'),

@@ -379,6 +379,90 @@ print(model.predict([0.07, 0.17]).total_contact_force)
             self.assertIn(line, ' '.join(said(self.run_raw(*args))))
         self.assertGreater(float(lines[-1]), 0)
 
+    def test_null(self):
+        """Every function of the headers with NULL for its handles, and with a handle but NULL for the rest: an error or nothing, never a crash."""
+        import ctypes  # pylint: disable=import-outside-toplevel
+        import glob  # pylint: disable=import-outside-toplevel
+        import re  # pylint: disable=import-outside-toplevel
+        from hyco import _library as c  # pylint: disable=import-outside-toplevel
+        kinds = ('Scene', 'Samples', 'System', 'Solver', 'FOM', 'Snapshots', 'Reducer', 'ROM', 'Material', 'Contact', 'Cone')
+        scene, model = self.hyco_py.Scene('block.yaml'), self.hyco_py.Model(MODEL)
+        scene.solve([0.03, 900])
+        made = {'HycoScene': scene._open, 'HycoFOM': scene._last, 'HycoROM': model._open}  # pylint: disable=protected-access
+        for kind, first in [('Samples', (made['HycoScene'],)), ('Reducer', (c.World.comm, made['HycoScene']))] + [
+                (kind, (c.World.comm,)) for kind in ('System', 'Solver', 'Material', 'Contact', 'Cone')]:
+            made['Hyco' + kind] = ctypes.c_void_p()
+            c.call(f'Hyco{kind}Create', *first, ctypes.byref(made['Hyco' + kind]))
+
+        def survives(name, arguments, handles):
+            """In a process of its own; the arguments are C's declarations."""
+            values = []
+            for argument in arguments:
+                kind = argument.replace('const ', '').split()[0]
+                if kind == 'MPI_Comm':
+                    values.append(c.World.comm)
+                elif '*' in argument or '[' in argument or '(' in argument or kind[:4] == 'Hyco':
+                    values.append(handles.get(kind) if '*' not in argument else None)
+                else:
+                    values.append(ctypes.c_double(0) if kind == 'PetscReal' else ctypes.c_longlong(0))
+            child = os.fork()
+            if not child:
+                os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+                os.dup2(1, 2)
+                c.lib.HycoKeepErrors(1)
+                getattr(c.lib, name)(*values)
+                os._exit(0)
+            return os.WIFEXITED(os.waitpid(child, 0)[1])
+
+        crashed, tried = [], 0
+        for path in glob.glob(os.path.join(SOURCE, 'include', 'hyco*.h')):
+            with open(path, encoding='utf-8') as file:
+                text = re.sub(r'/\*.*?\*/', '', file.read(), flags=re.S)
+            for _, name, arguments in re.findall(r'\n(PetscErrorCode|PetscBool|PetscReal) (Hyco\w+)\(([^;{()]*(?:\(\*\w+\)\([^()]*\)[^;{()]*)?)\);', text):
+                arguments = re.sub(r'\(\*\w+\)\([^()]*\)', '*', ' '.join(arguments.split())).split(', ')
+                own = {argument.split()[0] for argument in arguments if re.fullmatch(r'Hyco\w+ \w+', argument)}
+                if name.endswith('_Private') or not hasattr(c.lib, name):
+                    continue
+                if own & ({'Hyco' + kind for kind in kinds} | {'HycoH5', 'HycoQueue', 'HycoFile'}):
+                    tried += 1
+                    crashed += [] if survives(name, arguments, {}) else [name]
+                if own & set(made):
+                    crashed += [] if survives(name, arguments, made) else [f'{name} with a handle']
+        self.assertEqual(crashed, [])
+        self.assertGreater(tried, 200)
+
+    def test_views_and_options(self):
+        """Views go to standard output without a viewer, and where an option of the caller's name says, with the object's prefix; options that a program
+        sets after it has loaded a scene count."""
+        import ctypes  # pylint: disable=import-outside-toplevel
+        from hyco import _library as c  # pylint: disable=import-outside-toplevel
+        hyco, seen = self.hyco_py, self.path('seen.txt')
+        with hyco.Scene('block.yaml') as scene, hyco.Model(MODEL) as model:
+            scene.solve([0.03, 900])
+            reducer, solver = ctypes.c_void_p(), ctypes.c_void_p()
+            c.call('HycoReducerCreate', c.World.comm, scene._open, ctypes.byref(reducer))  # pylint: disable=protected-access
+            c.call('HycoFOMGetSolver', scene._last, ctypes.byref(solver))  # pylint: disable=protected-access
+            for kind, handle in (('Scene', scene._open), ('ROM', model._open), ('FOM', scene._last), ('Solver', solver), ('Reducer', reducer)):  # pylint: disable=protected-access
+                for prefix in (b'', b'mine_'):
+                    c.call('PetscObjectSetOptionsPrefix', handle, prefix)
+                    option = b'-' + prefix + b'my_view'
+                    c.call('PetscOptionsSetValue', None, option, b'ascii:seen.txt')
+                    c.call(f'Hyco{kind}ViewFromOptions', handle, None, b'-my_view')
+                    c.call('PetscOptionsClearValue', None, option)
+                    self.assertGreater(os.path.getsize(seen), 20, (kind, prefix))
+                    os.remove(seen)
+                c.call('PetscObjectSetOptionsPrefix', handle, None)
+            c.call('HycoReducerDestroy', ctypes.byref(reducer))
+        with hyco.Scene('block.yaml') as scene:
+            c.call('PetscOptionsSetValue', None, b'-hyco_solver_max_its', b'1')
+            for name, value in ((b'-hyco_solver_fallback', b'0'), (b'-hyco_solver_warm_start', b'0')):
+                c.call('PetscOptionsSetValue', None, name, value)
+            self.assertFalse(scene.solve([0.05, 900], check=False).converged)
+            for name in (b'-hyco_solver_max_its', b'-hyco_solver_fallback', b'-hyco_solver_warm_start'):
+                c.call('PetscOptionsClearValue', None, name)
+        with hyco.Scene('block.yaml', hyco_mumps_icntl_14=90) as scene:
+            self.assertTrue(scene.solve([0.05, 900]).converged)
+
     def test_not_converged(self):
         """A solve that does not converge is an exception with the result, or with check=False a result that says so."""
         hyco = self.hyco_py

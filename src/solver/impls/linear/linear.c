@@ -58,6 +58,7 @@ static PetscErrorCode SolveIterative(HycoSolver s, Linear *l, Vec x, PetscBool *
   PetscCall(KSPGetConvergedReason(l->ksp, &why));
   PetscCall(KSPGetIterationNumber(l->ksp, &its));
   HycoCountLinear(s, its);
+  PetscCall(HycoSolverNoteKSP(s, l->ksp));
   PetscCall(HycoNameLinear(s, l->ksp));
   *solved = (PetscBool)(why > 0);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -79,6 +79,7 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
   PetscCall(KSPGetIterationNumber(g->ksp, &its));
   /* Counts of the report. */
   if (p->s->iterative) HycoCountLinear(p->s, its);
+  if (p->s->iterative) PetscCall(HycoSolverNoteKSP(p->s, g->ksp));
   if (!*singular) PetscCall(Evaluate(p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -328,6 +328,7 @@ static PetscErrorCode NameSolves(HycoSolver s, const Projected *f)
 
   PetscFunctionBegin;
   PetscCall(HycoConstrainedGetKSP(f->constrained, &ksp));
+  PetscCall(HycoSolverNoteKSP(s, ksp));
   PetscCall(HycoNameLinear(s, ksp));
   PetscCall(PetscSNPrintf(words, sizeof(words), "; %d iterations in %d solves, at most %d", (int)s->linear_its,
                           (int)s->linear_solves, (int)s->linear_most));
