@@ -169,6 +169,11 @@ PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *re
 PetscErrorCode HycoReducerDestroy(HycoReducer *reducer);
 /* Reads the options of a model and its training (hyco train -help) from the scene's options. Collective. */
 PetscErrorCode HycoReducerSetFromOptions(HycoReducer reducer);
+/* -hyco_model_type, -hyco_pod_tol (from 0 to 1), -hyco_rid_layers (0 or more): as given by an option, so that a search keeps
+   them. HycoReducerSetFromOptions() replaces them if the option is given. */
+PetscErrorCode HycoReducerSetModelType(HycoReducer reducer, HycoROMType type);
+PetscErrorCode HycoReducerSetPODTolerance(HycoReducer reducer, PetscReal tol);
+PetscErrorCode HycoReducerSetRIDLayers(HycoReducer reducer, PetscInt layers);
 /* Gets the type of model that the options set (-hyco_model_type); a search may choose another. */
 PetscErrorCode HycoReducerGetType(HycoReducer reducer, HycoROMType *type);
 /* Whether the training may give a model of a type that a text names ("hybrid or cubature"): that of

@@ -304,8 +304,8 @@ class Scene(_Handle):
                 c.call('PetscOptionsSetValue', None, f'-{name}'.encode(), _word(value))
             c.call('HycoSceneLoad', World.comm, str(path).encode(), ctypes.byref(self._handle))
         finally:
-            for name in entries:
-                c.call('PetscOptionsClearValue', None, f'-{name}'.encode())
+            self._solvers_read = {name for name in entries if self._handle and name.startswith('hyco_') and _of_solver(name)}
+            self._forget(name for name in entries if name not in self._solvers_read)
         self.parameters = _parameters(self._handle)
         self.outputs = _names('HycoSceneGetQuantities', self._handle)
         self.units = dict(zip(self.outputs, _names('HycoSceneGetQuantityUnits', self._handle)))
@@ -316,6 +316,17 @@ class Scene(_Handle):
 
     def __repr__(self):
         return _shown(self, repr(self.path), parameters=_ranges(self.parameters), outputs=', '.join(self.outputs))
+
+    @staticmethod
+    def _forget(names):
+        for name in names:
+            c.call('PetscOptionsClearValue', None, f'-{name}'.encode())
+
+    @c.whole
+    def close(self):
+        if c.running and self._handle:
+            self._forget(self._solvers_read)  # PETSc's solvers read them when they are made
+        super().close()
 
     @c.whole
     def solve(self, mu=(), check=True):

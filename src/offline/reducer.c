@@ -271,6 +271,7 @@ static PetscErrorCode CheckSVDOptions(HycoReducer t)
 static PetscErrorCode ReadTraining(HycoReducer t)
 {
   static const char *const indicators[] = {"local", "penetration", "residual", NULL};
+  const PetscBool set = t->pinned[HYCO_CHOICE_TYPE]; /* HycoReducerSetModelType() */
   PetscInt type = 0, indicator = (PetscInt)t->greedy.indicator;
   const char *const *types;
 
@@ -335,7 +336,8 @@ static PetscErrorCode ReadTraining(HycoReducer t)
   PetscCall(EndTraining(t)); /* the type's options may have changed */
   /* With friction the type without a search is bodies; a search begins with the settings of others, and may end with
      hybrid. */
-  if (t->scene && HycoSceneHasFriction(t->scene) && t->search && t->n_validation && !t->pinned[HYCO_CHOICE_TYPE])
+  if (t->scene && HycoSceneHasFriction(t->scene) && t->search && t->n_validation && !set &&
+      !t->pinned[HYCO_CHOICE_TYPE])
     PetscCall(HycoReducerSetType(t, HYCO_ROM_HYBRID));
   else
     PetscCall(HycoReducerSetType(t, types[type]));
@@ -470,12 +472,46 @@ static PetscErrorCode ReadAll(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerSetFromOptions(HycoReducer t)
+PetscErrorCode HycoReducerSetModelType(HycoReducer t, HycoROMType type)
 {
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
+  HycoCheckGiven(type);
+  PetscCall(HycoReducerSetType(t, type));
+  t->pinned[HYCO_CHOICE_TYPE] = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerSetPODTolerance(HycoReducer t, PetscReal tol)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
+  HycoCheckValue(tol >= 0 && tol <= 1, "the tolerance of the POD is %g; it must lie between 0 and 1", (double)tol);
+  t->tol[HYCO_SEED_DISPLACEMENT] = tol;
+  t->pinned[HYCO_CHOICE_TOLERANCE] = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerSetRIDLayers(HycoReducer t, PetscInt layers)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
+  HycoCheckValue(layers >= 0, "the RID has %d layers; it must be 0 or more", (int)layers);
+  t->layers = layers;
+  t->pinned[HYCO_CHOICE_LAYERS] = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerSetFromOptions(HycoReducer t)
+{
+  PetscBool before[sizeof(t->pinned) / sizeof(t->pinned[0])];
+
+  PetscFunctionBegin;
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
+  PetscCall(PetscMemcpy(before, t->pinned, sizeof(before)));
   PetscCall(HycoEntriesOverride(t->scene->options, PETSC_TRUE)); /* what a program has set since */
   PetscCall(ReadAll(t));
+  for (size_t k = 0; k < sizeof(before) / sizeof(before[0]); k++) t->pinned[k] = (PetscBool)(t->pinned[k] || before[k]);
   PetscCall(CheckSVDOptions(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

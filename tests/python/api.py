@@ -452,7 +452,20 @@ print(model.predict([0.07, 0.17]).total_contact_force)
                     self.assertGreater(os.path.getsize(seen), 20, (kind, prefix))
                     os.remove(seen)
                 c.call('PetscObjectSetOptionsPrefix', handle, None)
-            c.call('HycoReducerDestroy', ctypes.byref(reducer))
+            c.call('HycoReducerSetFromOptions', reducer)
+            for name, value in (('ModelType', b'hybrid'), ('PODTolerance', ctypes.c_double(1e-4)), ('RIDLayers', c.count(2))):
+                c.call('HycoReducerSet' + name, reducer, value)
+            c.call('HycoReducerSetFromOptions', reducer)
+            samples, report = ctypes.c_void_p(), np.zeros(1, c.struct('HycoTraining'))
+            c.call('HycoSamplesCreate', scene._open, ctypes.byref(samples))  # pylint: disable=protected-access
+            c.call('HycoSamplesAddTrainingGrid', samples, c.address(np.array([3, 2], c.integer()[1])))
+            c.call('HycoReducerSetValidationCount', reducer, c.count(0))
+            c.call('HycoReducerRun', reducer, samples, b'set.h5', c.address(report))
+            self.assertEqual(hyco.Model('set.h5').type, 'hybrid')
+            for handle, kind in ((samples, 'Samples'), (reducer, 'Reducer')):
+                c.call(f'Hyco{kind}Destroy', ctypes.byref(handle))
+            with self.assertRaises(ValueError):
+                hyco.Scene('block.yaml', hyco_mumps_icntl_99=1)
         with hyco.Scene('block.yaml') as scene:
             c.call('PetscOptionsSetValue', None, b'-hyco_solver_max_its', b'1')
             for name, value in ((b'-hyco_solver_fallback', b'0'), (b'-hyco_solver_warm_start', b'0')):
