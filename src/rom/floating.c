@@ -300,11 +300,14 @@ static PetscErrorCode Minimise(const Dual *d, PetscReal c[], PetscBool *met)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the forces' works miss of the loads' (size: of their terms), relative to the terms of each. */
+/* What the forces' works miss of the loads' (size: of their terms), relative to the terms of each motion. Without a load terms may be
+   round-off of the forces, where none acts along the motion. */
 static PetscReal Imbalance(const Dual *d, const PetscReal size[])
 {
-  PetscReal most = 0;
+  PetscReal most = 0, reach = 0, all = 0;
 
+  for (PetscInt i = 0; i < d->n * d->p; i++) reach = PetscMax(reach, PetscAbsReal(d->work[i]));
+  for (PetscInt k = 0; k < d->n; k++) all += PetscAbsReal(d->force[d->contact[k]]);
   for (PetscInt j = 0; j < d->p; j++) {
     PetscReal sum = -d->load[j], terms = size[j];
 
@@ -314,7 +317,7 @@ static PetscReal Imbalance(const Dual *d, const PetscReal size[])
       sum += work;
       terms += PetscAbsReal(work);
     }
-    if (terms > 0) most = PetscMax(most, PetscAbsReal(sum) / terms);
+    if (terms > HYCO_NOTHING * reach * all) most = PetscMax(most, PetscAbsReal(sum) / terms);
   }
   return most;
 }

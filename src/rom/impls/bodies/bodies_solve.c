@@ -1099,13 +1099,16 @@ PetscReal HycoBodiesUnbalanced(HycoBodiesWork o)
   return most;
 }
 
+/* On a motion along which neither loads nor forces act, as a body's that slides without friction, the terms are round-off of those
+   of the others: it has no balance to miss. */
 PetscReal HycoBodiesImbalance(HycoBodiesWork o)
 {
   const HycoSubstructures b = o->bodies;
-  PetscReal most = b->p ? 0 : -1;
+  PetscReal most = b->p ? 0 : -1, all = 0;
 
+  for (PetscInt k = 0; k < b->ns; k++) all += PetscAbsReal(o->f[k]);
   for (PetscInt i = 0; i < b->p; i++) {
-    PetscReal sum = 0, terms = 0;
+    PetscReal sum = 0, terms = 0, reach = 0;
 
     for (PetscInt j = 0; j < b->r; j++) {
       sum += o->work[i * b->r + j] * o->c[j];
@@ -1114,8 +1117,9 @@ PetscReal HycoBodiesImbalance(HycoBodiesWork o)
     for (PetscInt k = 0; k < b->ns; k++) {
       sum -= o->Z[k * b->p + i] * o->f[k];
       terms += PetscAbsReal(o->Z[k * b->p + i] * o->f[k]);
+      reach = PetscMax(reach, PetscAbsReal(o->Z[k * b->p + i]));
     }
-    if (terms > 0) most = PetscMax(most, PetscAbsReal(sum) / terms);
+    if (terms > LEFT * reach * all) most = PetscMax(most, PetscAbsReal(sum) / terms);
   }
   return most;
 }
