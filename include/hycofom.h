@@ -14,6 +14,7 @@ typedef struct _p_HycoFOM *HycoFOM;
 /* Seconds of the last solve, by stage. */
 typedef struct {
   PetscReal setup, assemble, factor, solve, total;
+  PetscReal cpu; /* processor time of all of it on all ranks that solve, with the outputs and estimates */
 } HycoSeconds;
 
 /*

@@ -55,7 +55,8 @@ typedef struct {
   PetscReal largest[HYCO_N_ERRORS], median[HYCO_N_ERRORS], mean[HYCO_N_ERRORS];
   PetscInt worst[HYCO_N_ERRORS]; /* the point with the largest */
   PetscReal end[HYCO_N_ERRORS];  /* for paths, the largest at their last listed time; otherwise 0 */
-  PetscReal seconds;             /* of an online solve, wall clock: mean over the points of the median of each */
+  PetscReal seconds;             /* processor time of a prediction without outputs and estimates: mean over the points
+                                    of the median of each */
 } HycoValidation;
 
 /* The settings that determine a model for given solutions; they are the options of the same names. */
@@ -152,9 +153,11 @@ typedef struct {
   PetscInt n_fresh; /* of the held-out points those drawn after solutions were added near others; 0: none was added */
   HycoScan scan;    /* singularity inside the parameters' ranges */
   PetscReal seconds_snapshots, seconds_reduction;
-  PetscReal seconds_solution; /* a full-order solution with what is kept from others, mean; 0: none was solved now */
-  PetscReal sliding;          /* the largest of all solutions, as in HycoSummary */
-  PetscReal time_error;       /* the largest of the paths that were solved now, as in HycoHistory */
+  PetscReal cpu_solution; /* processor time of a full-order solution with its outputs, mean; 0: none was solved now */
+  PetscReal cpu;          /* of the training up to the estimates, all ranks; solutions found in the store count as that
+                             mean. 0: not known */
+  PetscReal sliding;      /* the largest of all solutions, as in HycoSummary */
+  PetscReal time_error;   /* the largest of the paths that were solved now, as in HycoHistory */
 } HycoTraining;
 
 /* Gets solved[n_groups]: how many points each group of ranks has solved full order in the last run; those found in the

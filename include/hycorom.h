@@ -198,6 +198,8 @@ typedef struct {
    there, and again if a parameter changes it. Not collective. Fails for a model without a history. */
 PetscErrorCode HycoROMGetEquilibrium(HycoROM model, HycoEquilibrium *equilibrium);
 
+/* Processor time of the training that made the model, in seconds; 0: not known. */
+PetscErrorCode HycoROMGetTrainingCost(HycoROM model, PetscReal *cpu);
 /* Gets the summary of the last prediction, with estimated errors. Fails before the first prediction. */
 PetscErrorCode HycoROMGetPrediction(HycoROM model, HycoPrediction *prediction);
 /*

@@ -425,8 +425,9 @@ PetscErrorCode HycoBodiesLifts(HycoBodiesWork work, const HycoBodiesSurface *sur
                                char name[HYCO_LINE], PetscBool *lifts);
 /* g (p): row k of the contacts times the motions. */
 void HycoBodiesMotionRow(HycoBodiesWork work, PetscInt k, PetscReal g[]);
-/* The residuals at the contacts, recomputed from U and the forces; `stationarity` is that of floating bodies. */
-void HycoBodiesMeasure(HycoROM model, HycoKKT *kkt);
+/* The residuals at the contacts, recomputed from U and the forces; `stationarity` is that of floating bodies. Returns the
+   largest without the effect of rounding the terms whose sum the displacements are, which judges the solve. */
+PetscReal HycoBodiesMeasure(HycoROM model, HycoKKT *kkt);
 PetscReal HycoBodiesUnbalanced(HycoBodiesWork work);
 /* The same with all of the round-off, as HycoROM's `imbalance`; -1: supports prevent all motions. */
 PetscReal HycoBodiesImbalance(HycoBodiesWork work);

@@ -37,6 +37,7 @@ struct _p_HycoFOM {
   PetscBool gathered; /* for training: rank 0 has all contacts on the whole surfaces, others none (surface NULL) */
   PetscInt n_needed, *needed, place; /* nodes around which the surface has all facets; the positions they are for */
   PetscInt patches[2];               /* the most facets of a contact's master: on this surface, on all of the mesh */
+  PetscReal cpu;                     /* that of the last solve */
   PetscReal contact_cpu;             /* CPU seconds of this process so far in contacts: search, rows, B */
   HycoSystem system;
   HycoSolver solver;

@@ -136,7 +136,8 @@ struct _p_HycoReducer {
   HycoJudged *judged; /* rank 0, by sample: results of HycoReducerJudge(); NULL: not called */
   unsigned long long fingerprint;
   PetscInt n_solvers, *solved; /* of the last run, every rank: number of groups of ranks, and of solutions of each */
-  PetscReal seconds_solution;  /* HycoTraining */
+  PetscReal cpu_solution;      /* HycoTraining */
+  PetscReal cpu_begin;         /* of this rank, when the run began */
   PetscReal sliding;           /* of the last run's solutions, */
   PetscReal time_error;       /* of those that were solved now */
   PetscInt unsolved;           /* of the last run, every rank: HycoSnapshotsGetBalance() */

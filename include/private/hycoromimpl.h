@@ -45,6 +45,7 @@ typedef struct {
   PetscInt n_held; /* number of held-out predictions by which the model was judged; 0: none */
   PetscReal median[HYCO_N_ESTIMATES],
       largest[HYCO_N_ESTIMATES]; /* their relative errors; very large: not converged, or x/0 */
+  PetscReal cpu;                 /* of the training, processor time; 0: not known (older files) */
   PetscInt n_outputs;            /* 0: not judged (older files) */
   HycoOutputEstimate output[HYCO_MAX_QUANTITIES];
 } HycoEstimates;

@@ -17,12 +17,13 @@ struct _p_HycoSnapshots {
   PetscBool monitor;          /* -hyco_groups_monitor */
   PetscInt unsolved;          /* see HycoSnapshotsGetBalance() */
   PetscReal bytes, *written;  /* bytes of solutions written by this rank, and by each */
-  PetscReal spent[2];    /* seconds of this rank's groups in solutions, the first of each group apart: it sets up */
-  PetscInt timed[2];     /* their numbers */
-  PetscReal seconds;     /* of a solution, the mean of all ranks */
-  PetscReal sliding;     /* the largest of all points that were filled: HycoSummary */
-  PetscReal time_error; /* the same of the paths that were solved: HycoHistory */
-  HycoH5 last;           /* the file that was read last, checked and open; or NULL */
+  PetscReal spent;            /* processor time of the solutions of this rank's groups, counted on their first ranks */
+  PetscInt timed;             /* their number */
+  PetscReal cpu;              /* of a solution, mean */
+  PetscInt n_timed;           /* of all ranks */
+  PetscReal sliding;          /* the largest of all points that were filled: HycoSummary */
+  PetscReal time_error;      /* the same of the paths that were solved: HycoHistory */
+  HycoH5 last;                /* the file that was read last, checked and open; or NULL */
   char last_path[PETSC_MAX_PATH_LEN]; /* its name */
   PetscInt n_pieces;                  /* finished pieces of this training that have files, by their keys; rank 0 */
   unsigned long long *piece;

@@ -109,9 +109,8 @@ def worst(entry, contact):
     found = {key: largest(table[key][steps]) for key in ("error_u_rid", "error_sigma_11", "error_lambda_rid", "error_u")}
     found["failed"] = int((contact & (table["converged"] < 0.5)).sum())
     found["failed_without"] = int((~contact & (table["converged"] < 0.5)).sum())
-    found["speedup"] = entry["compare"]["speedup"]["median"]
-    found["ramp"] = table["seconds_full_order"].sum() / table["seconds_reduced"].sum()
-    found["ms"], found["full_ms"] = (1e3 * np.median(table[f"seconds_{key}"]) for key in ("reduced", "full_order"))
+    gain = entry["compare"]["gain"]
+    found["speedup"], found["ms"], found["full_ms"] = gain["times"], 1e3 * gain["cpu_predicted"], 1e3 * gain["cpu_full_order"]
     return found
 
 

@@ -121,7 +121,7 @@ def report(runs, size, found, folder):
               "first": np.flatnonzero(contact)[0] + 1, "contacts": contact.sum(), "second": f"{second:.0e}",
               "touching": touching, "dimension": b["dimension"], "five": radii_of("5 radii"), "nine": radii_of("9 radii"),
               "fine_u": one(fine["error_u_rid"]), "fine_sigma": one(fine["error_sigma_11"]), "ms": f"{fine['ms']:.3g}",
-              "full_ms": f"{fine['full_ms']:.3g}", "ramp": f"{fine['ramp']:.2g}",
+              "full_ms": f"{fine['full_ms']:.3g}",
               "force": f"{found['ramp']['total_contact_force'][-1]:.1f}",
               "shown": "; ".join(", ".join(m[:2]) for m in shown_models(found))}
     values.update(bound_values(b))

@@ -12,8 +12,8 @@ forces, the top of the pellet, contact nodes within 0.1 mm (without: *no extensi
 
 {numbers}
 The RID's share is that of S3's full-order contact force, at the loads 0.6 / 0.8 / 1. The
-speed-up is the median over the steps, relative to a full order that keeps its factor ({full_ms} ms per step, {ms} ms
-reduced), and {ramp} over the whole ramp; the paper's 10 is relative to an active set with a new matrix in each iteration.
+speed-up is CPU of the ramp at full order, which keeps its factor, over CPU of it predicted ({full_ms} ms per step, {ms} ms
+reduced); the paper's 10 is relative to an active set with a new matrix in each iteration.
 
 The accuracy is not monotone in modes, radii or layers, because DEIM's few elements change with each. In the paper the model is half as accurate without
 the extension; here the error over a larger RID need not fall.

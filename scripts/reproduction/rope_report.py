@@ -176,7 +176,7 @@ def table_1(found):
         return p["n_dof"] + p["n_multipliers"]
 
     ours = {"unknowns": [unknowns(r) for r in columns],
-            "speed": [f"{r['compare']['speedup']['median']:.2g}" for r in columns],
+            "speed": [f"{r['compare']['gain']['times']:.2g}" for r in columns],
             "its": [r["point"][0]["active_set_iterations"] for r in columns],
             "u": [percent(r["point"][1]["error_u"]["mean"]) for r in columns], "forces": [forces(r) for r in columns]}
     titles = {"unknowns": "unknowns", "speed": "speed-up", "its": "active-set iterations", "u": "displacement error, 2-norm [%]",

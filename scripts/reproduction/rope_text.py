@@ -49,7 +49,7 @@ With the paper's settings and all of A full order, then with the accurate settin
 
 ![figure 9]({folder}/figure-09.png)
 
-Ours, and the paper's in brackets; unknowns are the displacements and forces of A; our speed-up, the median over the test grid, is over a tridiagonal
+Ours, and the paper's in brackets; unknowns are the displacements and forces of A; our speed-up, in CPU over the test grid, is over a tridiagonal
 solve on 100 nodes, which leaves nothing to gain (the paper's: over a plain active set):
 
 {table_1}

@@ -43,8 +43,8 @@ static void FillCommon(const DriverColumns *c, const HycoSummary *s, const HycoP
   *sliding = PetscMax(*sliding, PetscMax(s->sliding, p->sliding));
   v[DRIVER_CONVERGED] = p->reason > 0;
   v[DRIVER_KKT] = HycoKKTMax(&p->kkt);
-  v[DRIVER_SECONDS_FOM] = s->seconds.total;
-  v[DRIVER_SECONDS_ROM] = p->seconds.total;
+  v[DRIVER_CPU_FOM] = s->seconds.cpu;
+  v[DRIVER_CPU_ROM] = p->seconds.cpu;
   /* A negative estimate means none, which a table shows as not a number. */
   for (PetscInt k = 0; k < DRIVER_ESTIMATES; k++) judged[k] = estimate[k] >= 0 ? estimate[k] : NAN;
   judged[DRIVER_ESTIMATES] = p->unseen;
@@ -61,21 +61,17 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   HycoPrediction p;
   HycoErrors e = {0};
   char words[DRIVER_LINE];
-  PetscReal begin = HycoNow(), seconds[2];
 
   PetscFunctionBegin;
   /* Each with its outputs, and the model's with its estimates, as a user asks for them. */
   PetscCall(HycoFOMSolve(fom, n_par, mu));
   PetscCall(HycoFOMGetSummary(fom, &s));
-  seconds[0] = HycoNow() - begin;
   if (s.reason < 0) {
     PetscCall(DriverFormatPoint(scene, mu, words, NULL));
     HycoFail("the full-order solution at %s failed: %s; no comparison is possible", words, s.why);
   }
-  begin = HycoNow();
   PetscCall(HycoROMPredict(model, n_par, mu));
   PetscCall(HycoROMGetPrediction(model, &p));
-  seconds[1] = HycoNow() - begin;
   PetscCall(HycoROMCompare(model, fom, &e));
   /* Of an arbitrary position there is no error: full order has chosen another one. */
   v[DRIVER_U] = p.loose ? NAN : e.u;
@@ -89,8 +85,6 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   v[DRIVER_LAMBDA_DUAL] = e.lambda_dual;
   FillCommon(c, &s, &p, v, sliding);
   PetscCall(PetscStrncpy(free_motion, p.free_motion, DRIVER_LINE));
-  v[c->n_errors + DRIVER_SECONDS_FOM] = seconds[0];
-  v[c->n_errors + DRIVER_SECONDS_ROM] = seconds[1];
   /* The fallback solver of the contact problem, not full order. */
   v[c->n_errors + DRIVER_FALLBACK] = p.reason == HYCO_CONVERGED_FALLBACK;
   v[c->n_errors + DRIVER_COVERED] = p.covered_force;
@@ -293,7 +287,7 @@ PetscErrorCode CommandCompare(void)
   DriverPiece all;
   DriverRows rows;
   PetscBool given, contact, extrapolate;
-  PetscReal sliding = 0;
+  PetscReal sliding = 0, training;
   PetscInt n_times, loose;
   char free_motion[DRIVER_LINE] = "";
   char path[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
@@ -334,7 +328,8 @@ PetscErrorCode CommandCompare(void)
   if (table[0]) PetscCall(DriverWriteTable(table, scene, p.mu, p.columns.names, &rows));
   PetscCall(DriverWarnSliding(sliding));
   PetscCall(PrintLoose(&p));
-  PetscCall(DriverReportComparison(scene, contact, &p.columns, p.n, p.value));
+  PetscCall(HycoROMGetTrainingCost(model, &training));
+  PetscCall(DriverReportComparison(scene, contact, training, &p.columns, p.n, p.value));
   PetscCall(PetscFree(p.value));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoROMDestroy(&model));

@@ -65,7 +65,7 @@ static PetscErrorCode PrintOutputEstimates(HycoScene scene, const HycoPrediction
 static PetscErrorCode PrintEstimates(HycoScene scene, const HycoPrediction *p, const DriverReducedPath *path)
 {
   const PetscReal estimate[3] = {p->estimated_error_u, p->estimated_error_sigma, p->estimated_error_lambda};
-  char words[3][32];
+  char words[3][32], rid[DRIVER_LINE] = "";
 
   PetscFunctionBegin;
   PetscCall(DriverPrintDependent(p->n_dependent, path ? path->n : 0, path ? path->step : NULL));
@@ -79,7 +79,10 @@ static PetscErrorCode PrintEstimates(HycoScene scene, const HycoPrediction *p, c
       snprintf(words[k], sizeof(words[k]), "none");
   }
   PetscCall(DriverPrintBalance(p->balance));
-  PetscCall(DriverPrint("estimated errors: u %s, stress %s, contact forces %s\n", words[0], words[1], words[2]));
+  if (p->rid_fraction < 1)
+    snprintf(rid, sizeof(rid), " (on %d of %.0f cells, rid = 1 in fields; no estimate covers the others)",
+             (int)p->rid_elements, rint((double)(p->rid_elements / p->rid_fraction)));
+  PetscCall(DriverPrint("estimated errors: u %s, stress %s%s, contact forces %s\n", words[0], words[1], rid, words[2]));
   PetscCall(PrintOutputEstimates(scene, p));
   DriverPercent(p->beyond, words[0]);
   if (p->beyond > 0)
@@ -447,7 +450,8 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
     PetscCall(HycoFOMWrite(fallback->fom, output));
   else if (output[0])
     HycoOnRoot(PETSC_COMM_WORLD, HycoROMWrite(model, output));
-  if (!why[0]) snprintf(covered, sizeof(covered), " (%.1f %% of it in the RID)", 100 * (double)p.covered_force);
+  if (!why[0] && p.n_contacts < p.n_all_contacts)
+    snprintf(covered, sizeof(covered), " (%.1f %% of it in the RID)", 100 * (double)p.covered_force);
   PetscCall(DriverPrint("total contact force %.10g%s, %d of %d contacts active; %s after %d iterations\n",
                         (double)p.total_contact_force, covered, (int)p.n_active, (int)p.n_all_contacts,
                         HycoReasonName(p.reason), (int)p.iterations));

@@ -38,61 +38,52 @@ static PetscErrorCode ReportGroups(cJSON *json, HycoReducer reducer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define HARDLY 3 /* a gain below it is hardly worth a training */
+#define TIMED 25 /* predictions for their time */
+#define LONG  1. /* seconds after which fewer are enough */
 
-#define TIMED 25  /* predictions for their time, the first of which sets up */
-#define LONG  0.5 /* seconds after which a few are enough */
-
-/* The mean time of predictions by the written model, with outputs and estimates, as a set makes them. Rank 0. */
+/* The mean processor time of predictions by the written model, with outputs and estimates, as a set makes them. Rank 0. */
 static PetscErrorCode TimeModel(HycoScene scene, const char path[], PetscReal *each)
 {
   HycoSamples points;
   HycoROM m;
   PetscInt n, n_par, k = 0;
   const PetscReal *mu;
-  PetscReal begin = 0;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesCreate(scene, &points));
   PetscCall(HycoSamplesAddScattered(points, TIMED));
   PetscCall(HycoSamplesGet(points, &n, &n_par, &mu));
   PetscCall(HycoROMLoad(path, &m));
-  for (; k < n && (k < 2 || HycoNow() - begin < LONG); k++) {
+  for (*each = 0; k < n && *each < LONG; k++) {
     HycoPrediction p;
 
-    /* Beside a long one its set-up does not count. */
-    if (k == 1 && HycoNow() - begin > LONG) break;
-    if (k <= 1) begin = HycoNow();
     PetscCall(HycoROMPredict(m, n_par, mu + k * n_par));
     PetscCall(HycoROMGetPrediction(m, &p));
+    *each += p.seconds.cpu;
   }
-  *each = (HycoNow() - begin) / (PetscReal)PetscMax(k - 1, 1);
+  *each /= (PetscReal)PetscMax(k, 1);
   PetscCall(HycoROMDestroy(&m));
   PetscCall(HycoSamplesDestroy(&points));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The time of a prediction beside that of a full-order solution, if this run has solved any. Both keep what a set
-   keeps. Collective. */
-static PetscErrorCode PrintGain(HycoScene scene, const char path[], const HycoTraining *t)
+/* If this run has solved any point at full order. Collective. */
+static PetscErrorCode ReportGain(cJSON *json, HycoScene scene, const char path[], const HycoTraining *t)
 {
-  const PetscReal each = t->seconds_solution;
   PetscReal one = 0;
+  PetscInt n_times;
 
   PetscFunctionBegin;
-  if (!(each > 0) || !t->held_out.n) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!(t->cpu_solution > 0) || !t->held_out.n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
   HycoOnRoot(PETSC_COMM_WORLD, TimeModel(scene, path, &one));
-  PetscCall(DriverPrint("a prediction takes %.3g ms, a full-order solution took %.3g ms%s\n", 1e3 * (double)one,
-                        1e3 * (double)each,
-                        each < one            ? ": this model is slower, looser targets may give a faster one"
-                        : each < HARDLY * one ? ": this model gains little, looser targets may give a faster one"
-                                              : ""));
+  PetscCall(DriverReportGain(json, n_times ? "path" : "point", t->cpu_solution, one, t->cpu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The keys are those of docs/output.md, which is made from outputs_list.c. */
-static PetscErrorCode Report(HycoScene scene, HycoReducer reducer, const HycoTraining *t, const GreedyLog *log,
-                             const Search *search)
+static PetscErrorCode Report(HycoScene scene, HycoReducer reducer, const char path[], const HycoTraining *t,
+                             const GreedyLog *log, const Search *search)
 {
   PetscInt n_par;
   cJSON *json, *seconds;
@@ -124,7 +115,8 @@ static PetscErrorCode Report(HycoScene scene, HycoReducer reducer, const HycoTra
   DriverReportModel(json, search, t);
   seconds = cJSON_AddObjectToObject(json, "seconds"); /* of the final model */
   ReportNumbers(seconds, {"snapshots", t->seconds_snapshots}, {"reduction", t->seconds_reduction},
-                {"solution", t->seconds_solution}, {"total", t->seconds_snapshots + t->seconds_reduction});
+                {"total", t->seconds_snapshots + t->seconds_reduction});
+  PetscCall(ReportGain(json, scene, path, t));
   PetscCall(ReportWrite(&json));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -291,11 +283,10 @@ PetscErrorCode CommandTrain(void)
   PetscCall(DriverWarnSliding(t.sliding));
   PetscCall(DriverWarnSteps(t.time_error));
   PetscCall(DriverJudgeModel(&search, &t));
-  PetscCall(PrintGain(scene, model, &t));
   PetscCall(DriverPrint("seconds: %.2f snapshots, %.2f reduction; model in %s\n", (double)t.seconds_snapshots,
                         (double)t.seconds_reduction, model));
   if (greedy) PetscCall(DriverJudgeGreedy(&log));
-  PetscCall(Report(scene, reducer, &t, &log, &search));
+  PetscCall(Report(scene, reducer, model, &t, &log, &search));
   PetscCall(PetscFree(search.text));
   PetscCall(PetscFree(log.text));
   PetscCall(HycoSamplesDestroy(&training));

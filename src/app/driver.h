@@ -146,6 +146,9 @@ typedef struct {
 void ReportNumbers_Private(cJSON *json, PetscInt n, const ReportNumber number[]);
 void ReportKKT(cJSON *json, const HycoKKT *kkt);
 void ReportSeconds(cJSON *json, const HycoSeconds *seconds);
+/* What a prediction gains: processor time of a point or path of a set at full order and predicted, with outputs and
+   estimates, and of the training (0: not known). Prints a line, and adds `gain`. */
+PetscErrorCode DriverReportGain(cJSON *json, const char point[], PetscReal full, PetscReal reduced, PetscReal training);
 void ReportVector(cJSON *json, const char name[], PetscInt n, const PetscReal v[]);
 /* Mean and largest of an error, in the report and in the text, over the converged of n points, and the number of
    points where it is not defined (x/0; also added to all_undefined). value: n x n_columns row major; column,
@@ -417,8 +420,8 @@ enum {
   DRIVER_KKT,
   DRIVER_COVERED,
   DRIVER_ITERATIONS = DRIVER_COVERED,
-  DRIVER_SECONDS_FOM,
-  DRIVER_SECONDS_ROM,
+  DRIVER_CPU_FOM,
+  DRIVER_CPU_ROM,
   DRIVER_LAMBDA_NORM, /* of full order, of points alone */
   DRIVER_SIGMA_NORM
 };
@@ -433,9 +436,9 @@ typedef struct {
 } DriverColumns;
 PetscErrorCode DriverCompareColumns(PetscBool paths, PetscInt n_outputs, const char *const outputs[],
                                     DriverColumns *columns);
-/* value: n rows, on every rank; fails if a prediction did not converge. */
-PetscErrorCode DriverReportComparison(HycoScene scene, PetscBool contact, const DriverColumns *columns, PetscInt n,
-                                      const PetscReal value[]);
+/* value: n rows, on every rank; training: as of DriverReportGain(). Fails if a prediction did not converge. */
+PetscErrorCode DriverReportComparison(HycoScene scene, PetscBool contact, PetscReal training,
+                                      const DriverColumns *columns, PetscInt n, const PetscReal value[]);
 
 PetscErrorCode CommandCheck(void);
 PetscErrorCode CommandSolve(void);

@@ -206,6 +206,29 @@ static void AddColumn(cJSON *json, const char name[], PetscInt n, PetscInt n_col
   }
 }
 
+#define HARDLY 3 /* times: a smaller gain is hardly worth a training */
+
+/* Processor time, which other load of the machine does not change. A training that never pays has no break-even. */
+PetscErrorCode DriverReportGain(cJSON *json, const char point[], PetscReal full, PetscReal reduced, PetscReal training)
+{
+  const PetscReal times = full / PetscMax(reduced, 1e-9), after = full > reduced ? training / (full - reduced) : 0;
+  cJSON *gain = cJSON_AddObjectToObject(json, "gain");
+
+  PetscFunctionBegin;
+  ReportNumbers(gain, {"times", times}, {"cpu_full_order", full}, {"cpu_predicted", reduced});
+  if (training > 0) cJSON_AddNumberToObject(gain, "cpu_training", training);
+  if (after > 0) cJSON_AddNumberToObject(gain, "break_even", PetscCeilReal(after));
+  PetscCall(DriverPrint("gain: a %s takes %.3g ms of CPU at full order, %.3g ms predicted with outputs and estimates: "
+                        "%.3g times%s",
+                        point, 1e3 * (double)full, 1e3 * (double)reduced, (double)times,
+                        times < 1        ? "; this model is slower"
+                        : times < HARDLY ? "; this model gains little"
+                                         : ""));
+  if (after > 0) PetscCall(DriverPrint("; the training pays from %.0f %ss on", ceil((double)after), point));
+  PetscCall(DriverPrint("\n"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Relative errors, in per cent on the screen and as shares in the report. Points where the error is x/0 are
    counted and left out of the mean, which would otherwise be infinite. */
 void ReportError(cJSON *json, const char name[], PetscInt n, PetscInt n_columns, const PetscReal value[],

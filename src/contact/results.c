@@ -167,8 +167,9 @@ PetscErrorCode HycoContactResults(HycoFE fe, const HycoPairs *pairs, const Petsc
       if (q ? !of[k] : pairs->contact[k] != c) continue;
       r->n++;
       if (pairs->shear) r->friction_work += pairs->shear->work[k];
-      /* An open contact counts as 0, so that a seal that opens anywhere shows it. */
-      r->pressure_min = PetscMin(r->pressure_min, lambda[k] > least ? pressure[k] : 0);
+      /* An open contact counts as 0, so that a seal that opens anywhere shows it. A node without area has no force of its
+         own, and the pressure of the middles beside it. */
+      r->pressure_min = PetscMin(r->pressure_min, lambda[k] > least || !(area[k] > 0) ? pressure[k] : 0);
       /* Forces of round-off are no contact: areas would jump by nodes that barely touch. */
       if (lambda[k] > least)
         Add(fe, fe->X + 3 * pairs->slave[k], normal + 3 * k, area[k], lambda[k], shear, pressure[k], r);

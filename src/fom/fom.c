@@ -565,7 +565,7 @@ static PetscErrorCode CheckPoint(HycoFOM f, PetscInt n, const PetscReal mu[])
 PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
 {
   HycoSeconds *t;
-  PetscReal begin = HycoNow();
+  PetscReal begin = HycoNow(), cpu = HycoCPU();
 
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
@@ -574,6 +574,7 @@ PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
   PetscCall(CheckPoint(f, n, mu));
   if (f->path) {
     PetscCall(HycoPathSolve(f, mu));
+    f->cpu = HycoCPU() - cpu;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(HycoFOMAssemble(f, mu));
@@ -585,6 +586,7 @@ PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
   PetscCall(HycoFOMCheckContactBalance(f));
   PetscCall(HycoFOMGather(f));
   t->total = HycoNow() - begin;
+  f->cpu = HycoCPU() - cpu;
   f->solved = PETSC_TRUE;
   PetscCall(HycoFOMViewFromOptions(f, NULL, "-hyco_fom_view"));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -178,7 +178,7 @@ static void SumPath(HycoFOM f, HycoSummary *s)
 PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
 {
   HycoSummary *s;
-  PetscReal defect;
+  PetscReal defect, cpu = HycoCPU();
   char why[HYCO_LINE];
 
   PetscFunctionBegin;
@@ -218,6 +218,8 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   for (PetscInt k = 0; f->path && k < f->path->n_steps; k++)
     s->n_dependent = PetscMax(s->n_dependent, f->path->steps[k].n_dependent);
   PetscCall(HycoFOMMeasureQuantities(f, s->quantity));
+  s->seconds.cpu = f->cpu + HycoCPU() - cpu;
+  HycoAllreduce(&s->seconds.cpu, 1, MPIU_REAL, MPI_SUM, HycoComm(f));
   PetscCallMPI(MPI_Bcast(s, sizeof(*s), MPI_BYTE, 0, HycoComm(f)));
   *out = *s;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -292,6 +292,7 @@ static PetscErrorCode Conclude(HycoReducer t, HycoSamples points, PetscInt n, Hy
 
   PetscFunctionBegin;
   estimates.n_held = v->n;
+  estimates.cpu = report->cpu;
   for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) {
     /* -1: not compared at any point. */
     estimates.median[e] = PetscIsNanReal(v->median[errors[e]]) ? -1 : v->median[errors[e]];
@@ -365,6 +366,20 @@ PetscErrorCode HycoReducerJudgeCorners(HycoReducer t, HycoSamples corners, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The processor time of the training so far. Solutions of an earlier run count as the mean of this one's. */
+static PetscErrorCode CountCost(HycoReducer t, PetscInt n_held, HycoSnapshots store, HycoTraining *report)
+{
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  report->cpu = HycoCPU() - t->cpu_begin;
+  HycoAllreduce(&report->cpu, 1, MPIU_REAL, MPI_SUM, HycoComm(t));
+  PetscCall(HycoSamplesGet(t->samples, &n, NULL, NULL));
+  n = n_held + (t->late ? 0 : n) - store->n_timed;
+  report->cpu = store->n_timed ? report->cpu + PetscMax(n, 0) * store->cpu : 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Fits the estimates to the errors at `points`, which are those of the n rows. */
 static PetscErrorCode Learn(HycoReducer t, HycoSamples points, PetscInt n, HycoHeldOut rows[], HycoROM model,
                             HycoSnapshots store, HycoTraining *report)
@@ -374,6 +389,7 @@ static PetscErrorCode Learn(HycoReducer t, HycoSamples points, PetscInt n, HycoH
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(n, &outputs));
   PetscCall(HycoReducerJudgeOutputs(t, points, model, store, rows, outputs));
+  PetscCall(CountCost(t, n, store, report));
   /* Rank 0 has the rows of all points, and the fit is small. */
   HycoOnRoot(HycoComm(t), Conclude(t, points, n, rows, outputs, model, report));
   PetscCallMPI(MPI_Bcast(&report->n_held, 1, MPIU_INT, 0, HycoComm(t)));

@@ -398,7 +398,7 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
   PetscCall(CheckStart(t, (PetscBool)!start, loop.samples));
   PetscCall(HycoReducerOpen(t, loop.samples, path, &loop.store));
   HycoFinally(RunOn(t, &loop, path, &report), PetscCall(HycoReducerClose(t, &loop.store)); report.sliding = t->sliding;
-              report.seconds_solution = t->seconds_solution; report.time_error = t->time_error;
+              report.cpu_solution = t->cpu_solution; report.time_error = t->time_error;
               PetscCall(HycoSamplesDestroy(&loop.samples)); PetscCall(PetscFree(loop.value)));
   if (training_report) *training_report = report;
   PetscFunctionReturn(PETSC_SUCCESS);

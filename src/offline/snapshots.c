@@ -389,16 +389,16 @@ static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A full-order solution, and its time. */
-static PetscErrorCode Solve(HycoSnapshots s, HycoFOM fom, const PetscReal mu[])
+/* A full-order solution with its outputs, and its processor time on all ranks of the group. */
+static PetscErrorCode Solve(HycoSnapshots s, HycoFOM fom, const PetscReal mu[], HycoSummary *summary)
 {
-  const PetscReal begin = HycoNow();
-  const int later = fom->solved;
-
   PetscFunctionBegin;
   PetscCall(HycoFOMSolve(fom, s->scene->n_parameters, mu));
-  s->spent[later] += HycoNow() - begin;
-  s->timed[later]++;
+  if (!fom->solved) PetscFunctionReturn(PETSC_SUCCESS); /* a path without a listed time */
+  PetscCall(HycoFOMGetSummary(fom, summary));
+  if (HycoRank(HycoComm(fom)) != 0) PetscFunctionReturn(PETSC_SUCCESS);
+  s->spent += summary->seconds.cpu;
+  s->timed++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -408,12 +408,13 @@ static PetscErrorCode Solve(HycoSnapshots s, HycoFOM fom, const PetscReal mu[])
 static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[])
 {
   HycoHistory history;
+  HycoSummary summary;
   char at[HYCO_LINE];
 
   PetscFunctionBegin;
   PetscCall(HycoFOMSetStepMonitor(fom, WriteStep, w));
   fom->path->between = WriteBetween;
-  PetscCall(Solve(w->s, fom, mu));
+  PetscCall(Solve(w->s, fom, mu, &summary));
   PetscCall(HycoFOMGetHistory(fom, &history));
   HycoSceneNamePoint(w->s->scene, mu, at);
   /* Half of a path would train a model that is wrong at the end and does not know it. */
@@ -459,8 +460,7 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
     PetscCall(SolvePath(s, fom, mu, force));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(Solve(s, fom, mu));
-  PetscCall(HycoFOMGetSummary(fom, &summary));
+  PetscCall(Solve(s, fom, mu, &summary));
   /* Full order has added a spring to a body that nothing holds; a reduced stiffness has no such term. */
   HycoCheck(!summary.regularised[0],
             "neither supports nor contact keep %s: full order can be regularised, but a reduced model cannot; fix a "
@@ -552,17 +552,17 @@ static PetscErrorCode SolveAndTell(HycoSnapshots s, HycoQueue queue, const Missi
 /* Adds the counts of a queue whose tasks are done. */
 static PetscErrorCode CountWork(HycoSnapshots s, HycoQueue queue)
 {
-  PetscInt groups, left, timed[2];
-  PetscReal spent[2];
+  PetscInt groups, left;
+  PetscReal spent[2] = {s->spent, s->timed};
 
   PetscFunctionBegin;
   PetscCall(HycoQueueCount(queue, &groups, s->solved));
   PetscCall(HycoQueueLeft(queue, &left));
   s->n_groups = PetscMax(s->n_groups, groups);
   s->unsolved = PetscMax(s->unsolved, left);
-  PetscCallMPI(MPI_Allreduce(s->spent, spent, 2, MPIU_REAL, MPI_SUM, HycoComm(s)));
-  PetscCallMPI(MPI_Allreduce(s->timed, timed, 2, MPIU_INT, MPI_SUM, HycoComm(s)));
-  s->seconds = spent[timed[1] > 0] / PetscMax(timed[timed[1] > 0], 1);
+  HycoAllreduce(spent, 2, MPIU_REAL, MPI_SUM, HycoComm(s));
+  s->n_timed = (PetscInt)spent[1];
+  s->cpu = spent[0] / PetscMax(spent[1], 1);
   PetscCallMPI(MPI_Allgather(&s->bytes, 1, MPIU_REAL, s->written, 1, MPIU_REAL, HycoComm(s)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

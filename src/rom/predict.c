@@ -81,7 +81,7 @@ PetscErrorCode HycoROMSetUp(HycoROM m)
 PetscErrorCode HycoROMPredict(HycoROM m, PetscInt n, const PetscReal mu[])
 {
   HycoPrediction *p;
-  PetscReal begin = HycoNow();
+  PetscReal begin = HycoNow(), cpu = HycoCPU();
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
@@ -105,6 +105,7 @@ PetscErrorCode HycoROMPredict(HycoROM m, PetscInt n, const PetscReal mu[])
   /* After the reconstruction: it scales all forces. */
   if (p->reason > 0 && !m->model->scene->n_times) PetscCall(HycoFloatingBalance(m));
   p->seconds.total = HycoNow() - begin;
+  p->seconds.cpu = HycoCPU() - cpu;
   m->solved = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -130,6 +130,8 @@ static PetscErrorCode MeasureEquilibrium(HycoROM m, HycoPrediction *p)
    asked for, not in HycoROMPredict(): a program that wants forces alone does not pay for estimates and outputs. */
 PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
 {
+  const PetscBool first = (PetscBool)!m->measured;
+  const PetscReal begin = HycoNow(), cpu = HycoCPU();
   HycoPrediction *p;
 
   PetscFunctionBegin;
@@ -161,7 +163,19 @@ PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
   /* After the outputs, whose magnitudes bound their estimates from below. */
   PetscCall(HycoEstimatesEvaluate(m, p));
   PetscCall(MeasureEquilibrium(m, p));
+  /* Outputs and estimates are a part of the prediction. */
+  if (first) p->seconds.total += HycoNow() - begin;
+  if (first) p->seconds.cpu += HycoCPU() - cpu;
   *out = *p;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of models of earlier versions, and without held-out solutions, it is not known. */
+PetscErrorCode HycoROMGetTrainingCost(HycoROM m, PetscReal *cpu)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  *cpu = m->model->estimates.cpu;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

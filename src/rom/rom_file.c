@@ -154,6 +154,7 @@ static PetscErrorCode SaveEstimates(HycoH5 h, HycoROM m)
       numbers[1 + HYCO_N_ESTIMATES + e] = PetscMin(t->largest[e], PETSC_MAX_REAL);
     }
     PetscCall(HycoH5WriteReal(h, "training/held_out", HELD_NUMBERS, 1, numbers));
+    PetscCall(HycoH5WriteReal(h, "training/cpu", 1, 1, &t->cpu));
   }
   /* Errors of outputs are stored without estimates too: `view` shows them. */
   PetscCall(SaveOutputEstimates(h, m));
@@ -197,6 +198,21 @@ static PetscErrorCode LoadHeldOut(HycoH5 h, HycoROM m)
   }
   PetscCall(PetscFree(numbers));
   HycoCheck(good, "%s: training/held_out is damaged", m->model->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Older files do not have it. */
+static PetscErrorCode LoadCost(HycoH5 h, HycoROM m)
+{
+  PetscReal *cpu;
+  PetscInt one = 1;
+
+  PetscFunctionBegin;
+  if (!HycoH5Has(h, "training/cpu")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5LoadReal(h, "training/cpu", &one, &one, &cpu));
+  m->model->estimates.cpu = *cpu;
+  PetscCall(PetscFree(cpu));
+  HycoCheck(m->model->estimates.cpu >= 0, "%s: training/cpu is damaged", m->model->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -297,6 +313,7 @@ static PetscErrorCode LoadEstimates(HycoH5 h, HycoROM m)
   PetscFunctionBegin;
   if (HycoH5Has(h, "training/search")) PetscCall(HycoH5LoadText(h, "training/search", &m->model->search));
   PetscCall(LoadHeldOut(h, m));
+  PetscCall(LoadCost(h, m));
   PetscCall(LoadReached(h, m));
   /* Its numbers are of formulas with fewer features. */
   if (HycoH5Has(h, "training/trust")) PetscCall(LoadOldEstimates(h, m));

@@ -103,6 +103,26 @@ class Facing(Case):
         self.hyco('train', '-scene', 'arcs.yaml', '-values_press', '0.1,0.2,0.3,0.4', '-model', 'a.h5', '-hyco_rid_whole', 'true')
         return 'a.h5'
 
+    def test_slot(self):
+        """Two groups of one body: the arms of a slotted plate touch, the free end first; at full order and in a model of bodies."""
+        wide, gap, height = 24, 0.05, (0, 2, 4, 4.05, 6.05, 8.05)
+        node = [[1 + i + (wide + 1) * j for i in range(wide + 1)] for j in range(6)]
+        elements = [(3, 1, (node[j][i], node[j][i + 1], node[j + 1][i + 1], node[j + 1][i])) for j in range(5) for i in range(wide) if j != 2 or i < 2]
+        elements += [(1, tag, (node[j][i], node[j][i + 1])) for tag, j, first in ((2, 0, 0), (3, 5, 0), (4, 2, 2), (5, 3, 2)) for i in range(first, wide)]
+        msh(self.path('slot.msh'), [(i, y, 0) for y in height for i in range(wide + 1)], elements, {1: (2, 'plate'), 2: (1, 'base'), 3: (1, 'top'), 4: (1, 'low'), 5: (1, 'high')})
+        with open(self.path('slot.yaml'), 'w', encoding='ascii') as file:
+            file.write('scene: {mesh: slot.msh, parameters: [press]}\nparameter: {press: {range: [1, 20]}}\nbody: {plate: {young: 2e4, poisson: 0.3}}\n'
+                       'fixed: {base: {x: 0, y: 0}}\npressure: {top: press}\ncontact: {slot: {type: surface, slave: high, master: low, tolerance: 0.1}}\n'
+                       'output: {tip: {min: u_y, group: high}, shut: {area: closed, contact: slot}}\n')
+        full = self.hyco('solve', '-scene', 'slot.yaml', '-mu', '10')
+        self.solved(full)
+        self.near(full['supports']['base']['force'][1], 10 * wide, 1e-8)
+        self.assertLess(-1.2 * gap, full['outputs']['tip'])  # without contact far more
+        self.assertTrue(0 < full['outputs']['shut'] < wide - 2)
+        self.hyco('train', '-scene', 'slot.yaml', '-values_press', '1,20', '-hyco_model_type', 'bodies', '-model', 's.h5')
+        found = self.hyco('predict', '-model', 's.h5', '-mu', '10')
+        self.near(found['total_contact_force'], full['total_contact_force'], 1e-9)
+
     def test_pair_is_moved(self):
         """A pair keeps its nodes: scaled together they still face each other, shifted by a facet they do not."""
         arcs(self.path('arcs.msh'), 20)

@@ -129,7 +129,7 @@ class Quadratic(Case):
         has the pressure of the facet around it: p0 = 3 F / (2 pi a^2), a^3 = 3 F R / (4 E*) of Hertz; a uniform pressure exactly."""
         E, nu, R, a = 200, 0.3, 10, 0.5
         body = f'body: {{seat: {{young: {E}, poisson: {nu}}}, block: {{young: {E}, poisson: {nu}}}}}\n'
-        joint = 'contact: {joint: {type: pair, slave: under, master: over, tolerance: 4}}\noutput: {peak: {max: contact_pressure, contact: joint}}\n'
+        joint = 'contact: {joint: {type: pair, slave: under, master: over, tolerance: 4}}\noutput: {peak: {max: contact_pressure, contact: joint}, least: {min: contact_pressure, contact: joint}}\n'
         for kind in KINDS:
             grid = self.on_axis(kind, np.linspace(0, 2, 5), np.linspace(0, 1, 4), lambda x: 0)
             text = f'scene: {{mesh: mesh.msh, formulation: axisymmetric}}\n{body}fixed: {{base: {{y: 0}}}}\npressure: {{top: 1.5}}\n{joint}'
@@ -137,6 +137,7 @@ class Quadratic(Case):
             self.solved(found)
             self.near(found['contacts']['joint']['area'], 4 * np.pi, 1e-12)
             self.near(found['outputs']['peak'], 1.5, 1e-9)
+            self.near(found['outputs']['least'], 1.5, 1e-9)
             np.testing.assert_allclose(self.axis_fields()[2], 1.5, rtol=1e-9)
             along = graded(a / 6, 1.5 * a, 8, 1.25)
             grid = self.on_axis(kind, along, along, lambda x: (x * x if x < 3 else 6 * x - 9) / 2 / R)  # a cone from x = 3 on

@@ -197,7 +197,7 @@ class Bodies(Case):
             f.write(text)
         return cls.path(name)
 
-    def judge(self, scene, points, train=('-scatter', '2'), forces=1e-10, u=1e-4, options=(), model='m.h5'):
+    def judge(self, scene, points, train=('-scatter', '2'), forces=1e-10, u=1e-4, options=(), model='m.h5', kkt=1e-12):
         """A model from these points is compared with full order at others; returns the report of the comparison."""
         shutil.rmtree(self.path(model + '.snapshots'), ignore_errors=True)
         self.hyco('train', '-scene', scene, *TYPE, *train, '-model', model, *options)
@@ -205,7 +205,7 @@ class Bodies(Case):
         self.assertEqual((c['not_converged'], c['undefined']), (0, 0))
         self.assertLess(c['error_lambda']['max'], forces)
         self.assertLess(c['error_u']['max'], u)
-        self.assertLess(c['kkt_max'], 1e-12)
+        self.assertLess(c['kkt_max'], kkt)
         return c
 
     def test_travels(self):
@@ -420,10 +420,14 @@ class Bodies(Case):
         self.judge(scene, ('-values_at', '-5.1,0.3,4.4', '-values_depth', '0.07,0.28', '-values_modulus', '6,17'))
 
     def test_sprung(self):
-        """A body that only a soft spring holds: without contact all of its surface is closed, deeply, and the first problem is of the few nearest ones."""
+        """A body that only a soft spring holds: without contact all of its surface is closed, deeply, and the first problem is of the few nearest ones. Its
+        displacement is the difference of large ones, whose rounding the residuals have and show. No share of the forces is in an RID, where there is none."""
         scene = self.write('sprung.yaml', SPRUNG)
-        self.judge(scene, ('-values_place', '-2.3,3.1', '-values_press', '0.4,0.9'), forces=1e-8, model='sprung.h5')
-        self.assertLess(self.hyco('predict', '-model', 'sprung.h5', '-mu', '1.3,0.5')['active_set_iterations'], 5)
+        self.judge(scene, ('-values_place', '-2.3,3.1', '-values_press', '0.4,0.9'), forces=1e-8, model='sprung.h5', kkt=1e-10)
+        found = self.hyco('predict', '-model', 'sprung.h5', '-mu', '1.3,0.5')
+        self.assertLess(found['active_set_iterations'], 5)
+        self.assertGreater(found['kkt']['penetration'] + found['kkt']['complementarity'], 0)
+        self.assertNotIn('in the RID', self.run_raw('predict', '-model', 'sprung.h5', '-mu', '1.3,0.5').stdout)
 
     def test_shape(self):
         """A radius: more samples reduce the errors of the forces, which stay within the bound; points between the samples. Three are accurate,

@@ -45,13 +45,12 @@ PetscErrorCode HycoBodiesDestroyModel(HycoROM m)
 
 #define ROUNDED 1e-6 /* most of a residual that may be the effect of rounding */
 
-/* What is left of the gap of contact k, without the effect of rounding the terms whose sum the displacements are: a body
-   on a soft spring moves far without contact and is pushed back as far. At most ROUNDED of `gaps`: more is an error. */
-static PetscReal Left(HycoROM m, PetscInt k, PetscReal gaps)
+/* What is left of the gap of contact k; *rounding: the effect of rounding the terms whose sum the displacements are, since a
+   body on a soft spring moves far without contact and is pushed back as far. At most ROUNDED of `gaps`: more is an error. */
+static PetscReal Left(HycoROM m, PetscInt k, PetscReal gaps, PetscReal *rounding)
 {
   const HycoBodiesWork o = (HycoBodiesWork)m->work;
-  const PetscReal left = m->rows.gap[k] - HycoROMAddRow(m, k, 0);
-  PetscReal terms = 0, rounding;
+  PetscReal terms = 0;
 
   for (PetscInt j = o->row_start[k]; j < o->row_start[k + 1]; j++) {
     const PetscInt at = o->row_at[j];
@@ -59,17 +58,17 @@ static PetscReal Left(HycoROM m, PetscInt k, PetscReal gaps)
     /* free and the response to the forces may be huge and opposite, as their sum u is small. */
     terms += PetscAbsReal(o->row[j]) * (PetscAbsReal(o->free[at]) + PetscAbsReal(o->u[at] - o->free[at]));
   }
-  /* Shrinks the residual towards 0 and never past it: a true penetration keeps its sign. */
-  rounding = PetscMin(HYCO_NOTHING * terms, ROUNDED * gaps);
-  return left > 0 ? PetscMax(left - rounding, 0) : PetscMin(left + rounding, 0);
+  *rounding = PetscMin(HYCO_NOTHING * terms, ROUNDED * gaps);
+  return m->rows.gap[k] - HycoROMAddRow(m, k, 0);
 }
 
 /* Residuals relative to the largest gap and force, as full order's are, so that one tolerance serves for both. */
-void HycoBodiesMeasure(HycoROM m, HycoKKT *kkt)
+PetscReal HycoBodiesMeasure(HycoROM m, HycoKKT *kkt)
 {
   const HycoBodiesWork o = (HycoBodiesWork)m->work;
-  PetscReal gaps = 0, u = 0, most = 0, in = 0, pulls = 0, both = 0;
+  PetscReal gaps = 0, u = 0, most = 0, beyond = 0;
 
+  *kkt = (HycoKKT){.stationarity = HycoBodiesUnbalanced(o)};
   /* Displacements along the surfaces too: where all contacts close without a gap, the others are round-off. */
   for (PetscInt i = 0; i < o->bodies->ns; i++) u = PetscMax(u, PetscAbsReal(o->u[i]));
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
@@ -82,22 +81,21 @@ void HycoBodiesMeasure(HycoROM m, HycoKKT *kkt)
     u = PetscMax(u, sum);
     gaps = PetscMax(gaps, PetscAbsReal(m->rows.gap[k]));
     most = PetscMax(most, PetscAbsReal(m->Lambda[k]));
-    pulls = PetscMax(pulls, -m->Lambda[k]);
   }
   gaps = PetscMax(gaps, u);
   /* Quotients first: products may overflow. */
   for (PetscInt k = 0; k < m->model->pairs.n && gaps > 0; k++) {
-    const PetscReal left = Left(m, k, gaps);
+    PetscReal rounding;
+    const PetscReal left = Left(m, k, gaps, &rounding) / gaps, share = most > 0 ? m->Lambda[k] / most : 0,
+                    more = PetscMax(PetscAbsReal(left) - rounding / gaps, 0);
 
     if (m->rows.start[k] == m->rows.start[k + 1]) continue;
-    in = PetscMax(in, -left);
-    if (most > 0) both = PetscMax(both, PetscAbsReal(left / gaps * (m->Lambda[k] / most)));
+    kkt->penetration = PetscMax(kkt->penetration, -left);
+    kkt->adhesion = PetscMax(kkt->adhesion, -share);
+    kkt->complementarity = PetscMax(kkt->complementarity, PetscAbsReal(left * share));
+    beyond = PetscMax(beyond, more * (left < 0 ? 1 : PetscAbsReal(share)));
   }
-  kkt->rounding = 0;
-  kkt->stationarity = HycoBodiesUnbalanced(o);
-  kkt->penetration = gaps > 0 ? in / gaps : 0;
-  kkt->adhesion = most > 0 ? pulls / most : 0;
-  kkt->complementarity = both;
+  return PetscMax(beyond, PetscMax(kkt->stationarity, kkt->adhesion));
 }
 
 /* The modes where displacements are not exact. */
@@ -149,7 +147,7 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
   HycoBodiesWork o = (HycoBodiesWork)m->work;
   HycoPrediction *p = &m->prediction;
   const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
-  PetscReal begin = HycoNow(), solve, norm;
+  PetscReal begin = HycoNow(), solve, norm, residual;
   PetscBool solved;
 
   PetscFunctionBegin;
@@ -159,16 +157,16 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
   p->seconds.assemble = solve - begin;
   PetscCall(HycoBodiesSolve(o, &s, mu, m->Lambda, &solved));
   PetscCall(ExpandAll(m));
-  HycoBodiesMeasure(m, &p->kkt);
+  residual = HycoBodiesMeasure(m, &p->kkt);
   m->imbalance = HycoBodiesImbalance(o);
   /* The bound of theory.md: from the samples' error e and the present forces; 0 where nothing is interpolated. */
   p->interpolation_error = HycoBodiesBound(o, &norm);
   PetscCall(HycoBodiesLoose(o, m->model->pairs.n, m->Lambda, &p->loose));
   if (p->loose) HycoBodiesNameFloating(o, m->model->scene, m->loose);
   p->iterations = o->its;
-  p->reason = solved && HycoKKTMax(&p->kkt) > m->solver->rtol ? HYCO_DIVERGED_RESIDUAL : o->reason;
+  p->reason = solved && residual > m->solver->rtol ? HYCO_DIVERGED_RESIDUAL : o->reason;
   /* As at full order: a method that ends without an answer of its own may have found it, but not beside the surfaces. */
-  if (!o->lacks && HycoKKTMax(&p->kkt) <= m->solver->rtol) p->reason = HYCO_CONVERGED;
+  if (!o->lacks && residual <= m->solver->rtol) p->reason = HYCO_CONVERGED;
   if (p->reason < 0) PetscCall(NameLifted(m, &s));
   PetscCall(PetscStrncpy(p->method, o->method, sizeof(p->method)));
   p->seconds.solve = HycoNow() - solve;

@@ -38,6 +38,7 @@ static PetscErrorCode Settle(HycoROM m, PetscReal t0, PetscReal t1, const PetscR
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   HycoPath p = w->path;
+  PetscReal residual = 0;
 
   PetscFunctionBegin;
   a->law.dt_factor = 1; /* elastic bodies: no law asks for shorter steps */
@@ -52,13 +53,14 @@ static PetscErrorCode Settle(HycoROM m, PetscReal t0, PetscReal t1, const PetscR
     PetscCall(HycoBodiesStrain(&w->bodies, &w->surface, alpha));
     HycoBodiesGiven(&w->bodies, &w->surface, Lambda);
     MoveAll(m);
-    HycoBodiesMeasure(m, &p->kkt);
+    residual = HycoBodiesMeasure(m, &p->kkt);
   }
   /* Equilibrium holds by condensation, but for rigid motions; what is left of it is Newton's residual of alpha. */
   p->kkt.stationarity = PetscMax(p->kkt.stationarity, a->residual);
   /* Recomputed from U and Lambda: the search's own word is not enough. */
-  a->converged = (PetscBool)(HycoKKTMax(&p->kkt) <= 1e-8);
-  if (!a->converged) HycoFormat(a->why, "the residual of the contacts is %.1e", (double)HycoKKTMax(&p->kkt));
+  residual = PetscMax(w->friction ? HycoKKTMax(&p->kkt) : residual, a->residual);
+  a->converged = (PetscBool)(residual <= 1e-8);
+  if (!a->converged) HycoFormat(a->why, "the residual of the contacts is %.1e", (double)residual);
   if (!a->converged && p->slides[0]) HycoFormat(a->why, "%s", p->slides);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
