@@ -371,9 +371,9 @@ PetscErrorCode HycoReducerJudgeCorners(HycoReducer reducer, HycoSamples corners,
 /* Predicts at a held-out point of the store, a path in the steps of full order. */
 PetscErrorCode HycoHeldOutPredict(HycoROM model, HycoSnapshots store, const PetscReal mu[]);
 /* At one held-out point by output of the scene: the absolute error, and the largest absolute value at full order; for a
-   path the largest of its listed times. NaN: not known. */
+   path the largest of its listed times. NaN: not known. norm: of the field that it follows (HycoOutputNorm()). */
 typedef struct {
-  PetscReal error[HYCO_MAX_QUANTITIES], size[HYCO_MAX_QUANTITIES];
+  PetscReal error[HYCO_MAX_QUANTITIES], size[HYCO_MAX_QUANTITIES], norm[HYCO_MAX_QUANTITIES];
 } HycoOutputErrors;
 /* Predicts again with the final model at those of n points where rows[] converged, and sets errors[n], zero before, and the rows' features, on rank 0. Nothing if
    the scene has no outputs. Collective; model, rows and errors are those of rank 0. */

@@ -33,6 +33,10 @@ typedef struct {
   PetscReal law[HYCO_ESTIMATE_FEATURES + 1];
   PetscReal magnitude;       /* its largest absolute value at the held-out points; < 0: not known, as the next two */
   PetscReal median, largest; /* of the errors there */
+  /* Of types whose errors do not follow the features, at the held-out points: the largest norm of the field that the
+     output follows, forces or displacements (HycoOutputNorm()); the largest error over that norm; over the absolute
+     error of the field. norm 0: not known. */
+  PetscReal norm, relative, amplified;
 } HycoOutputEstimate;
 typedef struct {
   PetscInt n; /* held-out predictions behind the estimates; 0: not calibrated */
@@ -391,6 +395,8 @@ PetscErrorCode HycoEstimatesFeatures(HycoROM model, PetscReal feature[]);
 /* The estimated errors of the last prediction, and how far outside the ranges it lies. */
 PetscErrorCode HycoEstimatesEvaluate(HycoROM model, HycoPrediction *prediction);
 PetscErrorCode HycoEstimatesView(HycoROM model, PetscViewer viewer);
+/* The norm of the predicted field that decides the output q, forces or displacements; kind (or NULL): of its error. */
+PetscReal HycoOutputNorm(const HycoQuantity *q, const HycoPrediction *prediction, HycoEstimateKind *kind);
 /* Distance of two points, with each parameter scaled to its range. */
 PetscReal HycoEstimatesDistance(HycoScene scene, const PetscReal a[], const PetscReal b[]);
 /* The contact forces' part of a comparison before any division: 2-norms of the error and of the reference, over all

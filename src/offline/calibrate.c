@@ -146,12 +146,30 @@ static PetscErrorCode FitError(PetscInt n, const HycoHeldOut rows[], HycoEstimat
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* How the errors of an output follow the field that decides it: the largest over its norm, and over its error. */
+static void Follow(PetscInt n, const HycoHeldOut rows[], const HycoOutputErrors found[], PetscInt q,
+                   const HycoScene scene, PetscReal force, HycoOutputEstimate *o)
+{
+  const HycoPrediction none = {0};
+  HycoEstimateKind kind;
+
+  (void)HycoOutputNorm(&scene->quantity[q], &none, &kind);
+  for (PetscInt i = 0; i < n; i++) o->norm = PetscMax(o->norm, found[i].norm[q]);
+  for (PetscInt i = 0; i < n && o->norm > 0; i++) {
+    const PetscReal norm = PetscMax(found[i].norm[q], HYCO_SMALL_FORCE * o->norm),
+                    field = PetscMax(HycoHeldOutError(&rows[i], errors[kind], force), PETSC_MACHINE_EPSILON);
+
+    o->relative = PetscMax(o->relative, found[i].error[q] / norm);
+    o->amplified = PetscMax(o->amplified, found[i].error[q] / norm / field);
+  }
+}
+
 /* One output of the scene: its errors at the converged points, and the formula for them. Errors up to round-off of the
    output's largest value are not told apart: relative to the output itself they have no meaning where it is zero, and
    relative to its spread none where it is constant. No estimate if an error is not known, or if the output is always
    zero. */
 static PetscErrorCode FitOutput(PetscInt n, const HycoHeldOut rows[], const HycoOutputErrors found[], PetscInt q,
-                                HycoEstimates *estimates)
+                                const HycoScene scene, HycoEstimates *estimates)
 {
   HycoOutputEstimate *o = &estimates->output[q];
   PetscReal *error, *sorted, least, median;
@@ -173,6 +191,7 @@ static PetscErrorCode FitOutput(PetscInt n, const HycoHeldOut rows[], const Hyco
   PetscCall(PetscSortReal(m, sorted));
   o->median = m ? sorted[m / 2] : -1;
   o->largest = m ? sorted[m - 1] : -1;
+  Follow(n, rows, found, q, scene, estimates->force, o);
   /* Without calibrated features (estimates->n = 0) there is nothing to fit with. */
   o->has = (PetscBool)(m && o->magnitude > 0 && estimates->n);
   PetscCall(Median(n, error, 1, 0, &median));
@@ -308,7 +327,7 @@ static PetscErrorCode Conclude(HycoReducer t, HycoSamples points, PetscInt n, Hy
   for (PetscInt q = 0; q < estimates.n_outputs; q++) {
     const HycoOutputEstimate *o = &estimates.output[q];
 
-    PetscCall(FitOutput(n, rows, outputs, q, &estimates));
+    PetscCall(FitOutput(n, rows, outputs, q, t->scene, &estimates));
     report->output[q] = (HycoOutputValidation){o->median, o->largest, o->magnitude, o->has};
   }
   report->n_held = PetscMin(estimates.n, v->n);

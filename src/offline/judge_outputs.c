@@ -187,7 +187,7 @@ static PetscErrorCode MeasurePredicted(Outputs *o, const PetscReal mu[], HycoPre
 
   PetscFunctionBegin;
   PetscCall(HycoHeldOutPredict(o->m, o->store, mu));
-  HycoCatch(HycoROMMeasureQuantities(o->m, p), ierr, message);
+  HycoCatch(HycoROMGetPrediction(o->m, p), ierr, message);
   *known = (PetscBool)!ierr;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -205,6 +205,7 @@ static PetscErrorCode JudgeOne(Outputs *o, const PetscReal mu[], HycoOutputError
   PetscCall(MeasurePredicted(o, mu, &p, &known));
   for (PetscInt q = 0; !known && q < n_q; q++) e->error[q] = e->size[q] = NAN;
   if (!known) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt q = 0; q < n_q; q++) e->norm[q] = HycoOutputNorm(&m->model->scene->quantity[q], &p, NULL);
   for (PetscInt k = 0; k < n_times; k++) {
     const PetscReal *found = m->model->scene->n_times ? m->trace.step[k].quantity : p.quantity;
 

@@ -109,10 +109,12 @@ static PetscErrorCode LoadType(HycoH5 h, HycoROM m)
    training solution closes it. training/held_out: the number of predictions, medians and largest errors.
    training/estimates: the number behind them, the largest force, the floors, and for each error whether it has an
    estimate, the coefficients, the constant. training/outputs: a row for each output of the scene: whether it has an
-   estimate, its largest absolute value, median and largest error, the coefficients, the constant. */
+   estimate, its largest absolute value, median and largest error, the coefficients, the constant. training/followed: a
+   row for each of them: norm, relative, amplified. */
 enum {
   HELD_NUMBERS = 1 + 2 * HYCO_N_ESTIMATES,
   OUTPUT_NUMBERS = 5 + HYCO_ESTIMATE_FEATURES,
+  FOLLOWED_NUMBERS = 3,
   ESTIMATE_NUMBERS = 2 + HYCO_ESTIMATE_FEATURES + HYCO_N_ESTIMATES * (2 + HYCO_ESTIMATE_FEATURES)
 };
 
@@ -135,6 +137,13 @@ static PetscErrorCode SaveOutputEstimates(HycoH5 h, HycoROM m)
     for (PetscInt j = 0; j <= HYCO_ESTIMATE_FEATURES; j++) *at++ = o->law[j];
   }
   PetscCall(HycoH5WriteReal(h, "training/outputs", t->n_outputs, OUTPUT_NUMBERS, numbers));
+  at = numbers;
+  for (PetscInt q = 0; q < t->n_outputs; q++) {
+    *at++ = t->output[q].norm;
+    *at++ = t->output[q].relative;
+    *at++ = t->output[q].amplified;
+  }
+  PetscCall(HycoH5WriteReal(h, "training/followed", t->n_outputs, FOLLOWED_NUMBERS, numbers));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -272,6 +281,26 @@ static PetscErrorCode LoadOldEstimates(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Older files do not have it. */
+static PetscErrorCode LoadFollowed(HycoH5 h, HycoROM m)
+{
+  PetscReal *numbers;
+  PetscInt n = m->model->scene->n_quantities, width = FOLLOWED_NUMBERS;
+
+  PetscFunctionBegin;
+  if (!HycoH5Has(h, "training/followed")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5LoadReal(h, "training/followed", &n, &width, &numbers));
+  for (PetscInt q = 0; q < n; q++) {
+    HycoOutputEstimate *o = &m->model->estimates.output[q];
+
+    o->norm = numbers[FOLLOWED_NUMBERS * q];
+    o->relative = numbers[FOLLOWED_NUMBERS * q + 1];
+    o->amplified = numbers[FOLLOWED_NUMBERS * q + 2];
+  }
+  PetscCall(PetscFree(numbers));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The estimates of outputs, which need the number of held-out points that LoadEstimates() has read. */
 static PetscErrorCode LoadOutputEstimates(HycoH5 h, HycoROM m)
 {
@@ -347,6 +376,7 @@ static PetscErrorCode MoveEstimates(HycoH5 h, HycoROM m)
   }
   PetscCall(LoadEstimates(h, m));
   PetscCall(LoadOutputEstimates(h, m));
+  PetscCall(LoadFollowed(h, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -72,6 +72,19 @@ class Outputs(Case):
                   status=None)
         self.bounds(scene, 'rope.h5', {'mu1': (0.05, 0.25), 'mu2': (-0.05, 0.5)}, ('deep', 'mean', 'lift'))
 
+    def test_follows_the_field(self):
+        """A model of bodies whose shape is sampled, six held-out points: where the largest held-out error would be several times too small, the estimates of
+        outputs grow with the field that decides them and its estimated error."""
+        outputs = 'output: {peak: {max: contact_pressure, contact: under}, most: {max: mises, group: block}, turn: {moment: z, contact: under}}\n'
+        scene = self.scene('blocks', outputs, file='follow.yaml')
+        self.hyco('train', '-scene', scene, '-grid', '3,3', '-hyco_model_type', 'bodies', '-model', 'follow.h5')
+        self.points('follow.csv', {'crown': (0.02, 0.08), 'press': (0.02, 0.08)}, 60, 1)
+        self.hyco('predict', '-model', 'follow.h5', '-points', 'follow.csv', '-table', 'p.csv')
+        self.hyco('compare', '-scene', scene, '-model', 'follow.h5', '-points', 'follow.csv', '-table', 'c.csv')
+        for name in ('peak', 'most', 'turn'):
+            worst = max(c[f'error_output_{name}'] / p[f'estimated_error_output_{name}'] for p, c in zip(self.table('p.csv'), self.table('c.csv')))
+            self.assertLess(worst, 1, name)
+
     def test_training(self):
         """The errors that training reports are those of predict against solve at the held-out points, from 1 and 3 ranks; and the text and tables
         of a prediction have the report's estimates."""
