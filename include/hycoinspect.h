@@ -29,6 +29,7 @@ extern const char *const HycoAffectedNames[HYCO_N_AFFECTED];
 typedef struct {
   const char *name;
   PetscBool affects[HYCO_N_AFFECTED];
+  PetscBool wide; /* a positive stiffness that varies over more than a decade */
 } HycoVariableInspection;
 
 typedef struct {
@@ -50,7 +51,8 @@ typedef struct {
   PetscInt between;     /* masters between nodes, as where meshes do not match, unless the type is for this */
   PetscBool integrated; /* the type integrates over facets: either side may be the finer */
   PetscReal coarse; /* slave's facet size over the master's, median, where most contacts may close; 0: not compared */
-  PetscReal tolerance; /* of the search, where the scene states it and it decides; < 0: else */
+  PetscReal stiff_min, stiff_max; /* modulus of the slave's cells over the master's, extremes; 0: not compared */
+  PetscReal tolerance;            /* of the search, where the scene states it and it decides; < 0: else */
 } HycoContactInspection;
 
 typedef struct {
@@ -96,6 +98,8 @@ typedef struct {
   char lifted[1024];            /* the point of the first of these, and why a solve fails there; "": none */
   PetscInt n_motions, loose;    /* rigid motions that no support keeps; those of bodies that are not rigid */
   char **motion;                /* their names */
+  char no_bodies[1024];         /* why training refuses a model of bodies; "": it does not, or was not asked */
+  PetscBool loaded;             /* something moves the bodies at one of the points: a load, a support, heat, a gap */
   char bodies[1024];            /* how the parameters enter the bodies; "": not of this scene */
   PetscReal bytes, resident;    /* memory of a factor; of the processes now, all ranks */
   PetscReal first, next;        /* estimated seconds of a solve with a new stiffness, with the last one; on each rank */

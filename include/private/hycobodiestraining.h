@@ -34,8 +34,10 @@ typedef struct {
    parameters. Collective. */
 PetscErrorCode HycoBodyPartsFind(HycoFOM fom, const PetscReal mu[], HycoBodyParts *parts);
 PetscErrorCode HycoBodyPartsDestroy(HycoBodyParts *parts);
-/* "place: moves body cylinder rigidly; modulus: scales body block; nothing needs a sample" */
+/* "place: moves body cylinder rigidly; modulus: scales body block; no body needs a sample" */
 PetscErrorCode HycoBodyPartsDescribe(HycoScene scene, const HycoBodyParts *parts, char text[HYCO_LINE]);
+/* Why no model of these bodies can be made, in the words of training; "": it can. The contacts have been found. Collective. */
+PetscErrorCode HycoBodyPartsRefuse(HycoFOM fom, const HycoBodyParts *parts, char why[HYCO_LINE]);
 /* The number of parameters that change the shape of some body (of body b; b < 0: of any), and which. */
 PetscInt HycoBodyPartsShapes(const HycoBodyParts *parts, PetscInt b, PetscInt parameter[]);
 /* The first body that is not similar to itself at the same values of these; -1: none. */

@@ -197,7 +197,8 @@ struct _p_HycoScene {
   PetscInt n_variables; /* variables of expressions: the parameters; with a history also t and its tables' values */
   char *parameter[HYCO_MAX_PARAMETERS]; /* names of the variables, the parameters' first */
   PetscReal lo[HYCO_MAX_PARAMETERS], hi[HYCO_MAX_PARAMETERS];
-  PetscBool extrapolate; /* values outside the ranges are accepted */
+  PetscBool wide[HYCO_MAX_PARAMETERS]; /* a positive stiffness over more than a decade: its logarithm is sampled */
+  PetscBool extrapolate;               /* values outside the ranges are accepted */
   /* history; without one n_times is 0 */
   PetscInt n_times, n_tables;
   PetscReal *times; /* increasing; the first is the start of the path */
@@ -220,6 +221,9 @@ struct _p_HycoScene {
   PetscInt n_entries;
   char **key, **value;
 };
+
+/* The value of parameter p at a share of the way from lo to hi, of scene->wide ones of their logarithms. */
+PetscReal HycoSceneBetween(HycoScene scene, PetscInt p, PetscReal lo, PetscReal hi, PetscReal share);
 
 /* Registers the entries constant_NAME, once all variables are known. */
 PetscErrorCode HycoSceneReadConstants(HycoScene scene);

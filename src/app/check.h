@@ -22,6 +22,7 @@ PetscErrorCode CheckReportGroups(Check *check);
 PetscErrorCode CheckReportContacts(Check *check);
 PetscErrorCode CheckReportTies(Check *check);
 PetscErrorCode CheckReportMotions(Check *check);
+void CheckReportLoads(Check *check);
 
 /* -- check_cost.c -- */
 

@@ -1,10 +1,12 @@
 /* hyco check: contacts, ties, and rigid motions that contact alone prevents. */
 #include "check.h"
+#include <string.h>
 
-/* Facets of the slave larger than the master's by this factor are reported as coarser. */
+/* Facets of the slave larger than the master's by this factor are reported as coarser, a modulus as stiffer. */
 #define COARSER 1.5
 /* Of second order pressures alternate from node to node, by 8 to 13 % of the peak, if the slave is finer by more than this. */
-#define FINER 0.5
+#define FINER   0.5
+#define STIFFER 1.5
 /* A smallest gap above this share of the mesh's extent does not close by small displacements. */
 #define FAR 0.1
 
@@ -32,6 +34,23 @@ PetscErrorCode CheckReportTies(Check *check)
     PetscCall(DriverPrint("tie %s: %d nodes of %s follow %s\n", t->name, (int)t->n_nodes, t->slave, t->master));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The slave should be the softer side, and of equally stiff ones the finer: at all points of the ranges, so that no
+   parameter decides. Contacts that are integrated do not lose force between a coarse slave's nodes. */
+static void WarnOrder(Check *check, const HycoContactInspection *c)
+{
+  if (c->stiff_min > STIFFER)
+    CheckReportWarning(check,
+                       "contact %s: the slave (%s) is %.2g to %.2g times as stiff as the master (%s); pressures are "
+                       "more accurate with the softer side as slave: exchange the two",
+                       c->name, c->slave, (double)c->stiff_min, (double)c->stiff_max, c->master);
+  else if (c->coarse > COARSER && !c->integrated && !(c->stiff_max > 0 && c->stiff_max * STIFFER < 1))
+    CheckReportWarning(
+        check,
+        "contact %s: the slave's facets (%s) are %.2g times as long as the master's (%s); the finer side should "
+        "be the slave",
+        c->name, c->slave, (double)c->coarse, c->master);
 }
 
 /* What is probably a mistake, not what is an error: the scene can be solved. */
@@ -63,13 +82,23 @@ static void Warn(Check *check, const HycoContactInspection *c)
         "second order pressures then alternate from node to node: make the slave at most twice as fine, or "
         "exchange slave and master",
         c->name, c->slave, (double)c->coarse, c->master);
-  /* Contacts that are integrated do not lose force between a coarse slave's nodes. */
-  if (c->coarse > COARSER && !c->integrated)
-    CheckReportWarning(
-        check,
-        "contact %s: the slave's facets (%s) are %.2g times as long as the master's (%s); the finer side should "
-        "be the slave",
-        c->name, c->slave, (double)c->coarse, c->master);
+  WarnOrder(check, c);
+}
+
+/* The same two surfaces, exchanged. */
+static void WarnBothWays(Check *check, PetscInt k)
+{
+  const HycoContactInspection *c = &check->in.contact[k];
+
+  for (PetscInt j = 0; j < k && c->master; j++) {
+    const HycoContactInspection *other = &check->in.contact[j];
+
+    if (other->master && !strcmp(other->slave, c->master) && !strcmp(other->master, c->slave))
+      CheckReportWarning(check,
+                         "contacts %s and %s are one contact declared both ways: its pressures are divided between "
+                         "them; remove one",
+                         other->name, c->name);
+  }
 }
 
 /* One line for each contact, composed of what is known. */
@@ -117,8 +146,11 @@ PetscErrorCode CheckReportContacts(Check *check)
     if (c->facing_max) cJSON_AddNumberToObject(contact, "gap_max", c->gap_max);
     if (c->between) cJSON_AddNumberToObject(contact, "n_between_nodes", c->between);
     if (c->coarse > 0) cJSON_AddNumberToObject(contact, "slave_over_master", c->coarse);
+    if (c->stiff_max > 0)
+      ReportNumbers(contact, {"stiffness_over_master_min", c->stiff_min}, {"stiffness_over_master_max", c->stiff_max});
     PetscCall(Print(c));
     Warn(check, c);
+    WarnBothWays(check, k);
   }
   cJSON_AddNumberToObject(check->json, "n_without_effect", n_without);
   if (n_without)
@@ -153,4 +185,16 @@ PetscErrorCode CheckReportMotions(Check *check)
     CheckReportWarning(check, "solve fails at %d of the %d points assembled, the first %s", (int)in->n_lifted,
                        (int)in->n_systems, in->lifted);
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Nothing moves a scene without loads, prescribed displacements, heat and overlapping gaps. */
+void CheckReportLoads(Check *check)
+{
+  PetscBool loaded = check->in.loaded;
+
+  for (PetscInt k = 0; k < check->in.n_scene_contacts && !loaded; k++)
+    loaded = (PetscBool)(check->in.contact[k].facing_max && check->in.contact[k].gap_min < 0);
+  if (!loaded)
+    CheckReportWarning(check, "nothing loads the bodies: no force, pressure, traction, gravity, rotation, prescribed "
+                              "displacement, heat or overlap acts at any of the points that were assembled");
 }

@@ -131,5 +131,7 @@ PetscErrorCode CheckReportCost(Check *check, HycoSamples samples, PetscBool solv
   else
     PetscCall(PrintPaths(check, samples));
   if (in->body_values) PetscCall(PrintBodies(check, object));
+  if (in->no_bodies[0]) PetscCall(DriverPrint("no model of bodies: %s\n", in->no_bodies));
+  if (in->no_bodies[0]) cJSON_AddStringToObject(object, "bodies_refused", in->no_bodies);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

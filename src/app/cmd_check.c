@@ -4,8 +4,6 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-#define WIDE 10 /* ratio of a range's ends from which polynomials in its logarithm interpolate better */
-
 /* Collected, and printed at the end: among the other lines they would be overlooked. Rank 0 prints and reports them;
    the other ranks have the same list or none. */
 void CheckReportWarning(Check *check, const char format[], ...)
@@ -22,15 +20,15 @@ void CheckReportWarning(Check *check, const char format[], ...)
 /* A parameter's range: wide ones, those of a single value. */
 static PetscErrorCode ReportRange(Check *check, const HycoVariableInspection *v, PetscReal lo, PetscReal hi)
 {
-  const PetscBool *does = v->affects;
-
   PetscFunctionBegin;
-  /* Without a logarithm below 0; and a parameter of maps moves nodes rather than scales the stiffness. */
-  if (does[HYCO_AFFECTS_STIFFNESS] && !does[HYCO_AFFECTS_MAPS] && lo > 0 && hi >= WIDE * lo) {
+  if (v->wide) {
     cJSON_AddItemToArray(cJSON_GetObjectItem(check->json, "wide_ranges"), cJSON_CreateString(v->name));
-    PetscCall(DriverPrint("  for a hybrid model, let its logarithm be the parameter: q from %.4g to %.4g, and 10^q in "
-                          "place of %s\n",
-                          log10((double)lo), log10((double)hi), v->name));
+    CheckReportWarning(
+        check,
+        "the parameter %s is a stiffness over %.2g decades: training samples its logarithm, a grid and a "
+        "table of yours should too; or let that be the parameter: q from %.4g to %.4g, and 10^q in place "
+        "of %s",
+        v->name, log10((double)(hi / lo)), log10((double)lo), log10((double)hi), v->name);
   }
   if (lo == hi) CheckReportWarning(check, "the range of the parameter %s is a single value", v->name);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -89,6 +87,7 @@ static PetscErrorCode Describe(Check *check)
         DriverPrint("history of %d times from %g to %g\n", (int)n_times, (double)times[0], (double)times[n_times - 1]));
   cJSON_AddNumberToObject(check->json, "n_times", n_times);
   PetscCall(CheckReportGroups(check));
+  CheckReportLoads(check);
   PetscCall(DriverPrint("%d point%s of the ranges assembled%s%s\n", (int)in->n_points, in->n_points > 1 ? "s" : "",
                         !in->corners ? ": the centre and the ends of each parameter"
                         : n_par      ? ": the centre and the corners"

@@ -116,7 +116,8 @@ PetscErrorCode ReportColumns(HycoScene scene, PetscInt n, const char *const colu
   PetscCall(HycoSceneGetQuantities(scene, n_all, names + n));
   for (PetscInt k = 0; k < *n_all; k++) {
     for (PetscInt c = 0; c < n; c++) {
-      if (strcasecmp(names[n + k], columns[c]) || names[n + k] == renamed[k]) continue;
+      /* Readers tell T from t. */
+      if (strcmp(names[n + k], columns[c]) || names[n + k] == renamed[k]) continue;
       snprintf(renamed[k], sizeof(renamed[k]), "output.%s", columns[c]);
       names[n + k] = renamed[k];
     }

@@ -99,7 +99,8 @@ PetscErrorCode HycoInspectBodyCost(HycoFOM f, const HycoBodyParts *parts, const 
   PetscBool *turned, any = PETSC_FALSE;
 
   PetscFunctionBegin;
-  if (f->scene->n_times || HycoBodyPartsFail(parts) >= 0 || n_theta > 3) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoBodyPartsRefuse(f, parts, in->no_bodies));
+  if (f->scene->n_times || in->no_bodies[0]) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscCalloc1(parts->n, &turned));
   PetscCall(FindTurned(f, parts, mu, turned));
   HycoOnRoot(HycoComm(f), CountSurface(f, &ns));

@@ -54,7 +54,54 @@ static PetscErrorCode CompareFacets(HycoInspection *in, HycoFE fe, PetscInt cont
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same over the nodes of a tie. By the largest of its masters, since mortar ties have many of small weight. */
+/* How hard the cell is pressed in, E / (1 - nu^2) of an isotropic law; of another one the mean stiffness along the axes. */
+static PetscReal PlaneModulus(HycoFE fe, PetscInt cell)
+{
+  const PetscReal *c = fe->tangent + fe->tangent_start[cell];
+  PetscReal sum = 0;
+
+  if (HycoFEIsIsotropic(fe, cell)) return c[0] + 2 * c[1] > 0 ? 4 * c[1] * (c[0] + c[1]) / (c[0] + 2 * c[1]) : 0;
+  for (PetscInt d = 0; d < fe->dim; d++) sum += c[d * (fe->n_sigma + 1)] / fe->dim;
+  return sum;
+}
+
+/* The median over the facets of a group; 0: no cell is behind them. */
+static PetscErrorCode SurfaceModulus(HycoFE fe, const char key[], const char name[], PetscReal *modulus)
+{
+  HycoMesh m = fe->mesh;
+  PetscReal *each;
+  PetscInt g = 0, n = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(m, key, name, &g));
+  PetscCall(PetscMalloc1(m->n_facets, &each));
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    if (m->facet_group[f] == g && m->facet_cell[f] >= 0) each[n++] = PlaneModulus(fe, m->facet_cell[f]);
+  }
+  PetscCall(PetscSortReal(n, each));
+  *modulus = n ? each[n / 2] : 0;
+  PetscCall(PetscFree(each));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* At fe's parameters: the ratio of the two sides' moduli, whose extremes over the points are kept. */
+static PetscErrorCode CompareStiffness(HycoInspection *in, HycoFE fe, PetscInt contact, PetscBool first)
+{
+  HycoContact c = fe->scene->contact[contact];
+  HycoContactInspection *r = &in->contact[contact];
+  PetscReal slave, master;
+
+  PetscFunctionBegin;
+  if (!c->master || !c->ops->find || fe->dim == 1) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SurfaceModulus(fe, "contact", c->slave, &slave));
+  PetscCall(SurfaceModulus(fe, "contact", c->master, &master));
+  if (!(slave > 0 && master > 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  r->stiff_min = first ? slave / master : PetscMin(r->stiff_min, slave / master);
+  r->stiff_max = PetscMax(r->stiff_max, slave / master);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The facets of a tie's sides, over its nodes. By the largest of its masters, since mortar ties have many of small weight. */
 static PetscErrorCode CompareTie(HycoFE fe, PetscInt tie, PetscReal *coarse)
 {
   HycoMesh m = fe->mesh;
@@ -161,6 +208,7 @@ PetscErrorCode HycoInspectGaps(HycoInspection *in, HycoFE fe, PetscBool first)
     r->facing_max = PetscMax(r->facing_max, facing);
     if (HycoPairsFollows(p, c)) r->tolerance = -1; /* surfaces that move are searched at any distance */
     if (first) PetscCall(CompareFacets(in, fe, c));
+    PetscCall(CompareStiffness(in, fe, c, first));
   }
   PetscCall(PetscFree3(normal, gap, share));
   PetscFunctionReturn(PETSC_SUCCESS);

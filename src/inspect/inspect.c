@@ -61,6 +61,26 @@ static PetscErrorCode NamePoint(HycoScene s, const PetscReal v[], char place[HYC
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether forces or supports act at the assembled point; with a history also in between, if they change in time. Gaps are
+   on rank 0 alone, and are looked at there. Collective. */
+static PetscErrorCode FindLoads(HycoFOM f, HycoInspection *in, PetscBool first)
+{
+  const HycoScene s = f->scene;
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
+  PetscReal size;
+  int any;
+
+  PetscFunctionBegin;
+  PetscCall(VecNorm(f->F, NORM_INFINITY, &size));
+  any = size > 0 || f->fe->lifted || f->fe->temperature;
+  for (PetscInt p = s->n_parameters; first && p < s->n_variables; p++) changed[p] = PETSC_TRUE;
+  if (first && s->n_times)
+    any = any || HycoSceneLoadsChange(s, changed) || HycoSceneSupportsChange(s, f->fe->mesh, changed, PETSC_FALSE);
+  HycoAllreduce(&any, 1, MPI_INT, MPI_MAX, HycoComm(f));
+  in->loaded = (PetscBool)(in->loaded || any);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Assembles K, F, B and D for the variables v as solve does; its errors are reported with the point. Collective. A
    failure must name the point: the user gave ranges, not values. */
 static PetscErrorCode Assemble(HycoFOM f, HycoInspection *in, const PetscReal v[], PetscBool first)
@@ -73,6 +93,7 @@ static PetscErrorCode Assemble(HycoFOM f, HycoInspection *in, const PetscReal v[
   PetscCall(NamePoint(f->scene, v, place));
   HycoCheck(!ierr, "%s%s", place, message);
   PetscCall(HycoFOMLifts(f, message));
+  PetscCall(FindLoads(f, in, first));
   in->n_systems++;
   if (message[0] && !in->n_lifted++) PetscCall(PetscSNPrintf(in->lifted, sizeof(in->lifted), "%s%s", place, message));
   HycoOnRoot(HycoComm(f), Measure(f, in, v, first));

@@ -56,6 +56,7 @@ PetscErrorCode HycoInspectVariables(HycoInspection *in)
   PetscFunctionBegin;
   for (PetscInt p = 0; p < s->n_variables; p++) {
     in->variable[p].name = s->parameter[p];
+    in->variable[p].wide = (PetscBool)(p < s->n_parameters && s->wide[p]);
     FindReach(s, p, in->variable[p].affects);
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -100,7 +100,7 @@ PetscErrorCode HycoSamplesAddScattered(HycoSamples samples, PetscInt count)
        other. */
     const PetscInt faces = 2 * axes.n, number = face ? n_faces / faces + n_faces % faces * BETWEEN : n_inside;
 
-    for (PetscInt p = 0; p < n_par; p++) mu[p] = s->lo[p] + (s->hi[p] - s->lo[p]) * HycoHalton(1 + number, p);
+    for (PetscInt p = 0; p < n_par; p++) mu[p] = HycoSceneBetween(s, p, s->lo[p], s->hi[p], HycoHalton(1 + number, p));
     if (corner)
       PutAtCorner(&axes, 0, axes.n, n_corners++, s->lo, s->hi, mu);
     else if (face)
@@ -167,6 +167,7 @@ static PetscErrorCode Has(PetscInt n, PetscInt n_par, const PetscReal mu[], cons
 
 /* Unseen points as they are drawn. */
 typedef struct {
+  HycoScene scene;
   HycoSamples seen, drawn;
   PetscReal lo[HYCO_MAX_PARAMETERS], hi[HYCO_MAX_PARAMETERS];
   Axes axes;
@@ -240,7 +241,7 @@ static void Recur(const Drawing *d, PetscInt k, PetscInt turn, PetscReal point[]
     /* Within a group the shared axes stay: they cost a factor. */
     const PetscInt later = j < d->axes.n_lead && d->axes.n_lead < d->axes.n ? 0 : 3 * turn * BETWEEN;
 
-    point[p] = d->lo[p] + (d->hi[p] - d->lo[p]) * Coordinate(d->n_par, p, 1 + n + later);
+    point[p] = HycoSceneBetween(d->scene, p, d->lo[p], d->hi[p], Coordinate(d->n_par, p, 1 + n + later));
   }
 }
 
@@ -290,6 +291,7 @@ PetscErrorCode HycoSamplesUnseen(HycoSamples samples, PetscInt first, PetscInt c
   HycoCheckGiven(unseen);
   PetscCall(HycoSamplesGet(samples, &n, &d.n_par, &mu));
   PetscCall(HycoSamplesGetScene(samples, &scene));
+  d.scene = scene;
   /* Within the training's reach: the drawn points are to judge interpolation, which is all that a model promises. The
      reach of one point has no other: within the ranges. */
   PetscCall(HycoSamplesReach(scene, n, mu, d.lo, d.hi));

@@ -748,6 +748,31 @@ static PetscErrorCode FindMesh(HycoScene s, const char folder[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+#define WIDE 10 /* ratio of a range's ends above which equal steps leave out the lower decades */
+
+/* The parameters whose logarithm is sampled: of a modulus, or of a spring; one that also moves nodes is a length. */
+static void FindWide(HycoScene s)
+{
+  for (PetscInt p = 0; p < s->n_parameters; p++) {
+    PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, stiff = PETSC_FALSE, moves = PETSC_FALSE;
+
+    changed[p] = PETSC_TRUE;
+    for (PetscInt b = 0; b < s->n_bodies; b++) {
+      stiff = (PetscBool)(stiff || HycoMaterialChanges(s->body[b].law, changed));
+      for (PetscInt c = 0; c < 3; c++) moves = (PetscBool)(moves || HycoExprChanges(s->body[b].map[c], changed));
+    }
+    for (PetscInt k = 0; k < 4 * s->n_springs; k++)
+      stiff = (PetscBool)(stiff || HycoExprChanges(s->spring[k / 4].stiffness[k % 4], changed));
+    s->wide[p] = (PetscBool)(stiff && !moves && s->lo[p] > 0 && s->hi[p] > WIDE * s->lo[p]);
+  }
+}
+
+/* The ends are kept to the last bit. */
+PetscReal HycoSceneBetween(HycoScene s, PetscInt p, PetscReal lo, PetscReal hi, PetscReal share)
+{
+  return s->wide[p] && lo > 0 ? lo * PetscPowReal(hi / lo, share) : lo + (hi - lo) * share;
+}
+
 /* Reads everything from the entries in scene->options. The order matters: variables and constants before the
    expressions that use them. */
 static PetscErrorCode Build(HycoScene s, const char folder[])
@@ -781,6 +806,7 @@ static PetscErrorCode Build(HycoScene s, const char folder[])
       PetscCall(ReadMember(s, k));
   }
   PetscCall(CheckScene(s));
+  FindWide(s);
   for (PetscInt k = 0; k < s->n_quantities; k++) {
     char unit[HYCO_LINE];
 

@@ -156,7 +156,10 @@ PetscReal HycoEstimatesDistance(HycoScene s, const PetscReal a[], const PetscRea
   PetscReal sum = 0;
 
   for (PetscInt p = 0; p < s->n_parameters; p++) {
-    const PetscReal width = s->hi[p] > s->lo[p] ? s->hi[p] - s->lo[p] : 1, step = (a[p] - b[p]) / width;
+    const PetscReal width = s->hi[p] > s->lo[p] ? s->hi[p] - s->lo[p] : 1,
+                    step = s->wide[p] && a[p] > 0 && b[p] > 0
+                               ? PetscLogReal(a[p] / b[p]) / PetscLogReal(s->hi[p] / s->lo[p])
+                               : (a[p] - b[p]) / width;
 
     sum += step * step;
   }

@@ -477,7 +477,7 @@ class Bodies(Case):
         """How each parameter enters each body, found by evaluation."""
         self.assertEqual(self.hyco('check', '-scene', ROLLER)['bodies_by_parameter'],
                          'place: moves body cylinder rigidly; press: changes loads or given displacements of body cylinder; '
-                         'modulus: scales the stiffness of body block; nothing needs a sample')
+                         'modulus: scales the stiffness of body block; no body needs a sample')
         said = self.hyco('check', '-scene', self.write('turned.yaml', TURNED))['bodies_by_parameter']
         self.assertIn('size: enlarges body cylinder uniformly', said)
         self.assertIn('turn: moves body cylinder rigidly', said)

@@ -39,13 +39,13 @@ class Fit(Case):
 
     def test_ends(self):
         """A force that is out of reach: the answer is at the ends of the ranges, is a minimum, and its misfit is reported."""
-        r = self.hyco('fit', '-model', 'm.h5', '-target_lift', '100')
+        r = self.hyco('fit', '-model', 'm.h5', '-target_lift', '-100')
         self.assertTrue(r['converged'])
         self.assertLessEqual({'press', 'modulus'}, set(r['at_ends']))
         self.assertEqual((r['mu']['press'], r['mu']['modulus']), (1, 20))
-        self.near(r['misfit_model'], 1 - r['targets']['lift']['model'] / 100, 1e-6)
+        self.near(r['misfit_model'], 1 + r['targets']['lift']['model'] / 100, 1e-6)
         self.assertNotIn('misfit_full_order', r)
-        text = self.run_raw('fit', '-model', 'm.h5', '-target_lift', '100').stdout
+        text = self.run_raw('fit', '-model', 'm.h5', '-target_lift', '-100').stdout
         self.assertIn('the targets are not met', text)
         self.assertIn('NOT UNIQUE: 3 parameters are free', text)
         self.assertEqual(r['free'], 3)

@@ -4,7 +4,7 @@
   ```LANGUAGE NAME    a file of this name
   ```text             lines that the last commands printed, most of their words, in their order; a line "..." is left out. Numbers may differ by a per cent
                       or one in their last digit; by anything where both are below 1e-5, as counts of iterations, and where the line
-                      has seconds, milliseconds, megabytes or a speed-up.
+                      has seconds, milliseconds, megabytes or a gain.
 
 Blocks without a word after the language, except sh and text, are not run: they are for reading."""
 import difflib
@@ -16,7 +16,7 @@ from common import PATIENCE
 
 NUMBER = re.compile(r'(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])')
 COUNTED = re.compile(r'\d+ iterations')
-TIMED = re.compile(r'seconds|\d m?s\b|\d us\b| MB\b|speed-up')
+TIMED = re.compile(r'seconds|\d m?s\b|\d us\b| MB\b|gain:')
 
 
 def blocks(page):

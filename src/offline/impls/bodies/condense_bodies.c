@@ -12,10 +12,9 @@
 
 /* -- before the solves -- */
 
-/* Refuses bodies that would need too many samples. */
-static PetscErrorCode CheckParts(HycoReducer t)
+/* Why bodies would need too many samples; "": they do not. */
+static PetscErrorCode RefuseShapes(HycoScene scene, const HycoBodyParts *parts, char why[HYCO_LINE])
 {
-  const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
   /* Parameters are visited one by one and together: only together can they fail so. */
   const PetscInt fail = HycoBodyPartsFail(parts);
   PetscInt shape[HYCO_MAX_PARAMETERS];
@@ -23,22 +22,41 @@ static PetscErrorCode CheckParts(HycoReducer t)
   const PetscInt n = HycoBodyPartsShapes(parts, -1, shape);
 
   PetscFunctionBegin;
-  HycoCheckModel(fail < 0,
-                 "body %s: its parameters together change it by more than a rigid motion, a uniform scaling and a "
-                 "factor of its stiffness, though none does alone, which a model of bodies does not support; train a "
-                 "hybrid model",
-                 fail < 0 ? "" : parts->name[fail]);
-  for (PetscInt p = 0; p < n; p++) PetscCall(HycoListAdd(list, ", ", t->scene->parameter[shape[p]]));
+  why[0] = '\0';
+  if (fail >= 0)
+    HycoFormat(why,
+               "body %s: its parameters together change it by more than a rigid motion, a uniform scaling and a factor "
+               "of its stiffness, though none does alone, which a model of bodies does not support; train a hybrid "
+               "model",
+               parts->name[fail]);
+  if (fail >= 0 || n <= HYCO_MOST_THETA) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt p = 0; p < n; p++) PetscCall(HycoListAdd(list, ", ", scene->parameter[shape[p]]));
   for (PetscInt k = 0; k < parts->n; k++) {
     PetscInt own[HYCO_MAX_PARAMETERS];
 
     /* The message names bodies and parameters: either may be changed. */
     if (HycoBodyPartsShapes(parts, k, own)) PetscCall(HycoListAdd(bodies, ", ", parts->name[k]));
   }
-  HycoCheckModel(n <= HYCO_MOST_THETA,
-                 "body %s: %d parameters change shapes or ratios of moduli (%s), and a model of bodies samples at most "
-                 "%d; train a hybrid model",
-                 bodies, (int)n, list, HYCO_MOST_THETA);
+  HycoFormat(why,
+             "body %s: %d parameters change shapes or ratios of moduli (%s), and a model of bodies samples at most "
+             "%d; train a hybrid model",
+             bodies, (int)n, list, HYCO_MOST_THETA);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same of the unknowns of their surfaces: body k has those from start[k]. */
+static PetscErrorCode RefuseUnknowns(const HycoBodyParts *parts, PetscInt dim, const PetscInt start[],
+                                     char why[HYCO_LINE])
+{
+  PetscFunctionBegin;
+  why[0] = '\0';
+  for (PetscInt k = 0; k < parts->n && !why[0]; k++) {
+    if (start[k + 1] - start[k] > MOST_NODES * dim)
+      HycoFormat(why,
+                 "body %s has %d unknowns on the surfaces that may touch; a model of bodies stores the square of "
+                 "their number, and is limited to %d: train a hybrid model",
+                 parts->name[k], (int)(start[k + 1] - start[k]), (int)(MOST_NODES * dim));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -63,6 +81,7 @@ static PetscErrorCode CheckScene(HycoReducer t)
 PetscErrorCode HycoBodiesBegin(HycoReducer t)
 {
   PetscReal mu[HYCO_MAX_PARAMETERS];
+  char why[HYCO_LINE];
 
   PetscFunctionBegin;
   PetscCall(CheckScene(t));
@@ -70,7 +89,8 @@ PetscErrorCode HycoBodiesBegin(HycoReducer t)
   /* The first training point is the reference of all poses and factors. */
   PetscCall(HycoReducerColumn(t, 0, mu));
   PetscCall(HycoBodyPartsFind(t->fom, mu, &HycoTrainingOfBodies(t)->parts));
-  PetscCall(CheckParts(t));
+  PetscCall(RefuseShapes(t->scene, &HycoTrainingOfBodies(t)->parts, why));
+  HycoCheckModel(!why[0], "%s", why);
   if (t->scene->n_times) PetscCall(HycoBodiesCheckPath(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -152,9 +172,9 @@ static PetscErrorCode AddRing(HycoMesh m, PetscInt group, PetscBool near[])
 
 /* Takes from in[] the masters of moved surfaces that no slave meets over the ranges: a part slides on a small part of a
    large one. A prediction that meets another one is refused. Rank 0. */
-static PetscErrorCode LeaveOut(HycoReducer t, PetscBool in[])
+static PetscErrorCode LeaveOut(HycoFOM f, PetscBool in[])
 {
-  HycoFOM f = t->fom;
+  const HycoScene scene = f->scene;
   HycoMesh m = f->surface;
   HycoSamples points;
   HycoMet met;
@@ -163,20 +183,20 @@ static PetscErrorCode LeaveOut(HycoReducer t, PetscBool in[])
   PetscInt n;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesCreate(t->scene, &points));
+  PetscCall(HycoSamplesCreate(scene, &points));
   PetscCall(HycoSamplesAddScattered(points, SEARCHED));
   PetscCall(HycoSamplesGet(points, &n, NULL, &mu));
-  PetscCall(HycoMetFind(t->scene, m, &f->pairs, n, mu, NULL, &met));
+  PetscCall(HycoMetFind(scene, m, &f->pairs, n, mu, NULL, &met));
   PetscCall(PetscCalloc1(m->n_nodes + 1, &near));
   HycoPairsMark(&met.rows, near);
-  for (PetscInt k = 0; k < t->scene->n_contacts; k++) {
+  for (PetscInt k = 0; k < scene->n_contacts; k++) {
     PetscInt g = 0;
 
     /* Masters that stay with their slaves are all met. */
     if (!HycoPairsFollows(&f->pairs, k)) continue;
-    PetscCall(HycoMeshFindGroup(m, "contact", t->scene->contact[k]->slave, &g));
+    PetscCall(HycoMeshFindGroup(m, "contact", scene->contact[k]->slave, &g));
     for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) near[m->group_node[j]] = PETSC_TRUE;
-    PetscCall(HycoMeshFindGroup(m, "contact", t->scene->contact[k]->master, &g));
+    PetscCall(HycoMeshFindGroup(m, "contact", scene->contact[k]->master, &g));
     /* A margin: the points searched are a sample of the ranges. */
     for (PetscInt ring = 0; ring < RINGS; ring++) PetscCall(AddRing(m, g, near));
   }
@@ -210,10 +230,9 @@ static PetscErrorCode List(HycoFOM f, const PetscInt of[], const PetscBool in[],
 }
 
 /* The same for the nodes of the surfaces that may touch. Rank 0. Leaving out costs SEARCHED searches, and saves
-   the square of the unknowns: only for bodies with many. */
-static PetscErrorCode ListReached(HycoReducer t, const PetscInt of[], HycoSubstructures b, PetscInt global[])
+   the square of the unknowns: only for bodies with more than `many`. */
+static PetscErrorCode ListReached(HycoFOM f, const PetscInt of[], PetscInt many, HycoSubstructures b, PetscInt global[])
 {
-  HycoFOM f = t->fom;
   PetscInt most = 0;
   PetscBool *in;
 
@@ -223,11 +242,49 @@ static PetscErrorCode ListReached(HycoReducer t, const PetscInt of[], HycoSubstr
   PetscCall(List(f, of, in, b, global));
   for (PetscInt k = 0; k < b->n; k++) most = PetscMax(most, b->start[k + 1] - b->start[k]);
   /* A body's flexibility is dense: nodes that no slave ever meets are left out where that pays. */
-  if (most > MANY_UNKNOWNS && f->searches && t->scene->n_parameters) {
-    PetscCall(LeaveOut(t, in));
+  if (most > many && f->searches && f->scene->n_parameters) {
+    PetscCall(LeaveOut(f, in));
     PetscCall(List(f, of, in, b, global));
   }
   PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The unknowns of the bodies' surfaces, on every rank; global: their numbers in the distributed vectors, rank 0. The
+   caller frees it. Collective. */
+static PetscErrorCode FindUnknowns(HycoFOM f, const HycoBodyParts *parts, PetscInt many, HycoSubstructures b,
+                                   PetscInt **global)
+{
+  const PetscInt n = f->surface ? f->surface->n_nodes * b->dim : 0;
+  PetscInt *of;
+
+  PetscFunctionBegin;
+  PetscCall(BodiesOfSurface(f, parts, &of));
+  PetscCall(PetscCalloc1(b->n + 1, &b->start));
+  PetscCall(PetscMalloc1(n + 1, &b->dof));
+  PetscCall(PetscMalloc1(n + 1, global));
+  HycoOnRoot(HycoComm(f), ListReached(f, of, many, b, *global));
+  HycoBcast(b->start, b->n + 1, MPIU_INT, HycoComm(f));
+  b->ns = b->start[b->n];
+  PetscCall(PetscFree(of));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Masters that no slave meets are looked for only where they decide. */
+PetscErrorCode HycoBodyPartsRefuse(HycoFOM f, const HycoBodyParts *parts, char why[HYCO_LINE])
+{
+  HycoSubstructures b;
+  PetscInt *global;
+
+  PetscFunctionBegin;
+  PetscCall(RefuseShapes(f->scene, parts, why));
+  if (why[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscNew(&b));
+  b->n = parts->n;
+  b->dim = f->part->dim;
+  PetscCall(FindUnknowns(f, parts, MOST_NODES * b->dim, b, &global));
+  PetscCall(RefuseUnknowns(parts, b->dim, b->start, why));
+  HycoFreeAll(&b->start, &b->dof, &global, &b);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -236,33 +293,24 @@ static PetscErrorCode Select(HycoReducer t, HycoSubstructures b, Mat *N)
 {
   HycoFOM f = t->fom;
   const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
-  const PetscInt n = f->surface ? f->surface->n_nodes * b->dim : 0;
-  PetscInt *of, *global;
+  PetscInt *global;
+  char why[HYCO_LINE];
 
   PetscFunctionBegin;
-  PetscCall(BodiesOfSurface(f, parts, &of));
-  PetscCall(PetscCalloc1(b->n + 1, &b->start));
-  PetscCall(PetscMalloc1(n + 1, &b->dof));
-  PetscCall(PetscMalloc1(n + 1, &global));
-  HycoOnRoot(HycoComm(f), ListReached(t, of, b, global));
-  HycoBcast(b->start, b->n + 1, MPIU_INT, HycoComm(f));
-  b->ns = b->start[b->n];
+  PetscCall(FindUnknowns(f, parts, MANY_UNKNOWNS, b, &global));
   /* Other ranks have allocated by their own surface, of which they have none. */
   if (f->rank) PetscCall(PetscFree(b->dof));
   if (f->rank) PetscCall(PetscMalloc1(b->ns + 1, &b->dof));
   HycoBcast(b->dof, b->ns, MPIU_INT, HycoComm(f));
   /* The same on every rank, after the broadcast. */
-  for (PetscInt k = 0; k < b->n; k++)
-    HycoCheckModel(b->start[k + 1] - b->start[k] <= MOST_NODES * b->dim,
-                   "body %s has %d unknowns on the surfaces that may touch; a model of bodies stores the square of "
-                   "their number, and is limited to %d: train a hybrid model",
-                   parts->name[k], (int)(b->start[k + 1] - b->start[k]), (int)(MOST_NODES * b->dim));
+  PetscCall(RefuseUnknowns(parts, b->dim, b->start, why));
+  HycoCheckModel(!why[0], "%s", why);
   /* Columns as K's rows; one entry in each row, set by rank 0, which has the list. */
   PetscCall(MatCreateAIJ(HycoComm(f), PETSC_DECIDE, f->part->n_owned * b->dim, b->ns, f->n_nodes * b->dim, 1, NULL, 1,
                          NULL, N));
   for (PetscInt k = 0; k < b->ns && f->rank == 0; k++) PetscCall(MatSetValue(*N, k, global[k], 1, INSERT_VALUES));
   PetscCall(HycoMatAssemble(*N));
-  HycoFreeAll(&global, &of);
+  PetscCall(PetscFree(global));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

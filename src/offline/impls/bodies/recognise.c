@@ -549,7 +549,7 @@ PetscErrorCode HycoBodyPartsDescribe(HycoScene s, const HycoBodyParts *parts, ch
     HycoFormat(line, "body %s changes its shape where parameters change together", parts->name[body]);
     PetscCall(HycoListAdd(text, "; ", line));
   } else if (!HycoBodyPartsShapes(parts, -1, shape))
-    PetscCall(HycoListAdd(text, "; ", "nothing needs a sample"));
+    PetscCall(HycoListAdd(text, "; ", "no body needs a sample"));
   if (HycoBodyPartsShapes(parts, -1, shape) > HYCO_MOST_THETA) {
     HycoFormat(line, "a model of bodies samples at most %d such parameters, and is none here", HYCO_MOST_THETA);
     PetscCall(HycoListAdd(text, "; ", line));
