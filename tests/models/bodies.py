@@ -516,7 +516,7 @@ class Bodies(Case):
         """Every method that is asked for solves the contact problem of a prediction, and is named; it is refused with floating bodies; tolerance and
         fallback act."""
         self.hyco('train', '-scene', ROLLER, *TYPE, '-scatter', '2', '-model', 'v.h5', '-output_push_force', 'y', '-output_push_contact', 'under')
-        at = ('-model', 'v.h5', '-mu', '1.3,0.5,9')
+        at = ('-model', 'v.h5', '-mu', '-4.2,1,17')  # two iterations
         force = self.hyco('predict', *at)['total_contact_force']
         for name in ('lemke', 'semismooth', 'tao'):
             r = self.hyco('predict', *at, '-hyco_solver_type', name)
