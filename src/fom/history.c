@@ -340,7 +340,7 @@ static PetscErrorCode Reach(HycoPath p, PetscReal end, PetscBool *reached)
     const PetscReal t = p->t, stop = PetscMin(HycoSceneNextStop(s, p->t), NextGiven(p));
 
     /* Prescribed times replace the request. */
-    if (p->substeps && !p->given) p->dt = PetscMin(p->dt, (end - s->times[p->step - 1]) / (PetscReal)p->substeps);
+    if (p->substeps > 1 && !p->given) p->dt = PetscMin(p->dt, (end - s->times[p->step - 1]) / (PetscReal)p->substeps);
     PetscCall(HycoInterruptCheck());
     PetscCall(TryStep(p, stop));
     /* Where a body slides away in a larger step, its time is known well enough: steps just before it are the dearest. */

@@ -171,7 +171,7 @@ class Files(Case):
                                       ('training/estimates', (0, 0), 1e300, 'training/estimates is damaged'),
                                       ('training/estimates', (0, 0), 0, 'training/estimates is damaged'),
                                       ('training/estimates', (1, 0), -1, 'training/estimates is damaged'),
-                                      ('training/held_out', (1, 0), -1, 'training/held_out is damaged'),
+                                      ('training/held_out', (1, 0), -2, 'training/held_out is damaged'),
                                       ('training/held_out', (0, 0), 0, 'training/held_out is damaged'),
                                       ('table/counts', (1, 0), 16, 'table/counts is damaged|table/parameters is'),
                                       ('table/counts', slice(None), 16, 'table/counts is damaged'),

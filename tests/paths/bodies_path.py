@@ -37,6 +37,7 @@ fixed: {bottom: {x: 0, y: 0}, cap_top: {x: 0}}
 pressure: {cap_top: 100*push*q*(1 + 0.3*x)}
 contact: {rest: {type: surface, slave: cap_bottom, master: base_top, tolerance: 0.1, gap: gap*x*x}}
 history: {times: [0, 1, 3, 6, 10, 11, 12], tables: {q: [[0, 0.1], [1, 1], [10, 1], [11, 0.1], [12, 0.6]]}}
+hyco: {substeps: 1}
 """
 
 
