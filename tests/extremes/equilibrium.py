@@ -149,7 +149,6 @@ def stack(d, below, k):
                 d.text['fixed'][group] = {'normal': 0, 'direction': d.vector(n)}
                 d.held += [n @ box.motions(x, d.total) for x in box.face(a, end, True)]
                 continue
-            n = n * (-1 if r.random() < 0.1 else 1)  # some of the wrong sign
             d.text['contact'][group] = {'type': 'obstacle', 'group': group, 'normal': d.vector(n), 'gap': float(r.choice([0, 0.02, 0.3]) * d.length)}
             for x in box.face(a, end, True):
                 d.row(n, x, box)
@@ -167,14 +166,14 @@ def tool(d, box):
     d.grid.tool(KIND[n], [d.length * (20 + np.array([0, 1]))] * n)
     d.text['body']['tool'] = {'young': d.stress}
     d.text['fixed']['tool'] = {c: 0 for c in 'xyz'[:n - 1]}
-    sign, force = (-1 if r.random() < 0.15 else 1), r.choice([-1, -1, 0.5]) * r.uniform(0.2, 1)
-    d.text['contact']['punch'] = {'type': 'rigid', 'slave': f'{box.name}_seat', 'master': 'tip', 'normal': d.vector(sign * np.eye(n)[up]),
+    force = r.choice([-1, -1, 0.5]) * r.uniform(0.2, 1)
+    d.text['contact']['punch'] = {'type': 'rigid', 'slave': f'{box.name}_seat', 'master': 'tip', 'normal': d.vector(np.eye(n)[up]),
                                   'gap': float(r.choice([0, 0.05]) * d.length)}
     d.text['force'] = {'tip': {'xyz'[up]: f'{float(force * d.stress * d.length**(n - 1))!r}*share'}}
     d.work[-1] += force
     for x in box.face(up, 1):
-        d.row(sign * np.eye(n)[up], x, box)
-        d.rows[-1][-1] -= sign
+        d.row(np.eye(n)[up], x, box)
+        d.rows[-1][-1] -= 1
 
 
 def draw(seed):
