@@ -130,13 +130,14 @@ static PetscErrorCode MeasureEquilibrium(HycoROM m, HycoPrediction *p)
    asked for, not in HycoROMPredict(): a program that wants forces alone does not pay for estimates and outputs. */
 PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
 {
-  const PetscBool first = (PetscBool)!m->measured;
   const PetscReal begin = HycoNow(), cpu = HycoCPU();
   HycoPrediction *p;
+  PetscBool first;
 
   PetscFunctionBegin;
   HycoCheckGiven(out);
   PetscCall(CheckSolved(m));
+  first = (PetscBool)!m->measured;
   p = &m->prediction;
   p->dim = m->fe->dim;
   /* Sizes of the reduced problem: a report shows them beside full order's. */
