@@ -18,6 +18,7 @@ fixed: {y0: {y: 0}, y1: {x: 0.001*q}}
 pressure: {bore: push*q}
 contact: {stop: {group: bore, gap: "GAP"}}
 history: {times: [0, 1, 3, 6, 7], tables: {q: [[0, 0], [1, 1], [6, 1], [7, -1]]}}
+hyco: {substeps: 1}
 output: {hold: {reaction: y, group: y0}, wall: {reaction: x, group: y1}, least: {min: u_y}, carried: {force: y}, peak: {max: contact_pressure}}
 """
 NORTON, ELASTIC = '{law: norton, young: 1e4, poisson: 0.3, rate: 1e-7*creep, exponent: 3}', '{young: 1e4, poisson: 0.3}'
