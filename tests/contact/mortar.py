@@ -50,7 +50,7 @@ class Mortar(Case):
         roller.mesh(self.path('moved.msh'), 2)
         scene, model = self.path('scene.yaml'), self.path('bodies.h5')
         roller.scene(scene, 'moved.msh', kind='mortar', **RANGES)
-        self.hyco('train', '-scene', scene, '-model', model, '-grid', '2,2,2', '-hyco_model_type', 'bodies')
+        self.hyco('train', '-scene', scene, '-model', model, '-grid', '2,2,2', '-hyco_model_type', 'bodies', '-hyco_bodies_pod_tol', '1e-12')
         for mu in POINTS:
             u, forces, _ = self.fields('solve', '-scene', scene, '-mu', mu)
             found_u, found, _ = self.fields('predict', '-model', model, '-mu', mu)
