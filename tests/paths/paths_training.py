@@ -137,7 +137,7 @@ class Residual(Ring):
         """A path that turns where no training path has turned converges with large errors: the residual shows this, and is close to the errors
         within training."""
         with open(self.path('turn.yaml'), 'w', encoding='utf-8') as f:
-            f.write(TURN)
+            f.write(TURN + 'hyco: {substeps: 1}\n')
         scene = self.path('turn.yaml')
         self.hyco('train', '-scene', scene, '-model', self.path('turn.h5'), '-values_gap', '0.004,0.006,0.008', '-values_push', '0.8,1,1.2',
                   '-values_back', 0, '-hyco_pod_tol', '1e-10', '-hyco_rid_layers', 1, '-hyco_hybrid', 'all')
