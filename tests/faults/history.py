@@ -73,7 +73,7 @@ class Faults(Case):
         for kind in ('bodies', 'cubature'):
             self.fails('train', '-scene', RING, '-greedy', '-training_grid', '2,2', '-model', model, '-hyco_model_type', kind,
                        words=['-greedy', kind, 'grid'])
-        self.fails('solve', '-scene', RING, '-grid', '2,2', words=['history'])
+        self.fails('solve', '-scene', RING, '-grid', '2,2', '-hyco_checkpoint', 'c.h5', words=['hyco_checkpoint'])
         self.assertFalse(os.path.exists(model))
         self.assertEqual(glob.glob(os.path.join(model + '.snapshots', '*')), [])
 
