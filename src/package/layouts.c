@@ -28,7 +28,7 @@ static const HycoMember summary[] = {
   F(lambda_max), F(lambda_norm2), F(u_norm2), F(u_min), F(u_max), F(u_relative), F(quantity), F(n_facing), F(overlap),
   F(sliding), F(strain_energy), F(external_work), F(gap_work), F(energy_defect), F(kkt.stationarity),
   F(kkt.penetration), F(kkt.adhesion), F(kkt.complementarity), F(kkt.rounding), F(reason), F(seconds.setup),
-  F(seconds.assemble), F(seconds.factor), F(seconds.solve), F(seconds.total), F(loose), F(regularised), F(buried), F(why)};
+  F(seconds.assemble), F(seconds.factor), F(seconds.solve), F(seconds.total), F(seconds.cpu), F(loose), F(regularised), F(buried), F(why)};
 #undef F
 
 #define F(member) FIELD(HycoStep, member)
@@ -67,7 +67,7 @@ static const HycoMember prediction[] = {
   F(estimated_error_quantity), F(inconsistency), F(inconsistent), F(balance), F(unbalanced), F(unseen),
   F(unseen_feature), F(beyond), F(gives_forces), F(interpolation_error), F(kkt.stationarity), F(kkt.penetration),
   F(kkt.adhesion), F(kkt.complementarity), F(kkt.rounding), F(method), F(reason), F(seconds.setup),
-  F(seconds.assemble), F(seconds.factor), F(seconds.solve), F(seconds.total), F(n_dependent), F(loose),
+  F(seconds.assemble), F(seconds.factor), F(seconds.solve), F(seconds.total), F(seconds.cpu), F(n_dependent), F(loose),
   F(why), F(free_motion)};
 #undef F
 

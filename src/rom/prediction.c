@@ -176,6 +176,7 @@ PetscErrorCode HycoROMGetTrainingCost(HycoROM m, PetscReal *cpu)
 {
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  HycoCheckGiven(cpu);
   *cpu = m->model->estimates.cpu;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
