@@ -29,7 +29,9 @@ extern "C" {
 typedef struct _p_HycoCone *HycoCone;
 typedef const char *HycoConeType;
 #define HYCO_CONE_NONNEGATIVE "nonnegative" /* each component >= 0; no data */
-#define HYCO_CONE_COULOMB     "coulomb" /* friction; data: mu and g, |r_t| <= mu r_n + g, with g = 0 for Coulomb's law */
+#define HYCO_CONE_COULOMB                                                                                              \
+  "coulomb" /* friction; data: mu and g, |r_t| <= mu r_n + g, with g = 0 for Coulomb's
+                                           law */
 
 /* The largest number of components of a block. */
 #define HYCO_MAX_BLOCK 3

@@ -47,8 +47,8 @@ struct _HycoContactOps {
   /* Sets the slave nodes and their masters on the mesh as drawn. NULL: the nodes of `group` that have a free
      displacement, without masters. */
   PetscErrorCode (*setup)(HycoContact, struct _n_HycoFE *fe, PetscInt index, struct _n_HycoPairs *pairs);
-  /* Appends to `found` the contacts first .. last - 1 of `pairs`, on surfaces that a map moves, with their masters at most
-     the reach of their search away. NULL: masters do not change. */
+  /* Appends to `found` the contacts first .. last - 1 of `pairs`, on surfaces that a map moves, with their masters at
+     most the reach of their search away. NULL: masters do not change. */
   PetscErrorCode (*find)(HycoContact, struct _n_HycoFE *fe, const struct _n_HycoPairs *pairs, PetscInt first,
                          PetscInt last, struct _n_HycoPairs *found);
   /* Computes unit normals (n x 3), outward from the slave side. NULL: from the entries normal_x, ... at the master

@@ -100,14 +100,15 @@ typedef struct {
   const PetscReal *taken; /* their ends. Borrowed */
   /* of each output of the scene the largest (for `min` the smallest) over the listed times that were reached */
   PetscReal path_quantity[HYCO_MAX_QUANTITIES];
-  PetscInt n_bound; /* number of steps that only -hyco_step_inelastic kept from growing; since a resumption */
-  PetscReal time_error; /* sum of the steps' estimated errors of creep strains, relative to the largest inelastic strain */
+  PetscInt n_bound;     /* number of steps that only -hyco_step_inelastic kept from growing; since a resumption */
+  PetscReal time_error; /* sum of the steps' estimated errors of creep strains, relative to the largest inelastic
+                           strain */
 } HycoHistory;
 
 /* The derivatives of the scene's outputs with respect to its parameters, in the unit of the output over that of the
    parameter. Where the derivatives to the two sides differ, `kink` is true, and the value is that towards larger
-   parameter values (at the upper end of the range towards smaller ones): contacts with neither force nor gap, a change of
-   master, cells that share the largest stress. Of a path, `value` is that at its last listed time. */
+   parameter values (at the upper end of the range towards smaller ones): contacts with neither force nor gap, a change
+   of master, cells that share the largest stress. Of a path, `value` is that at its last listed time. */
 typedef struct {
   PetscInt n_outputs, n_parameters;
   PetscInt n_undecided;   /* contacts with neither force nor gap; 0 for a path */
@@ -159,9 +160,10 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM fom, HycoSummary *summary);
   Gets the gradient at the last solution, by the linear system of its closed contacts with the factor of K: for each
   parameter one forward and one back substitution, and differences of element sums, contact rows and outputs, never of
   solutions. With a history: by differences of two paths for each parameter in the steps of this one, with a smaller
-  tolerance of Newton's method. The solution stays. Collective; the same values on every rank. Fails without an output or
-  a parameter, where a solve did not converge or a path did not end, for a solver without a factor (-hyco_linear), with
-  -hyco_regularise, and where the forces of closed contacts are not unique; after an error there is no last solution.
+  tolerance of Newton's method. The solution stays. Collective; the same values on every rank. Fails without an output
+  or a parameter, where a solve did not converge or a path did not end, for a solver without a factor (-hyco_linear),
+  with -hyco_regularise, and where the forces of closed contacts are not unique; after an error there is no last
+  solution.
 */
 PetscErrorCode HycoFOMGetGradient(HycoFOM fom, HycoGradient *gradient);
 

@@ -1,5 +1,5 @@
-/* HycoInspection: what a scene consists of and what its mesh, contacts and costs are, over the ranges of its parameters,
-   without a solve; hyco check prints it. */
+/* HycoInspection: what a scene consists of and what its mesh, contacts and costs are, over the ranges of its
+   parameters, without a solve; hyco check prints it. */
 #ifndef HYCOINSPECT_H
 #define HYCOINSPECT_H
 
@@ -103,8 +103,8 @@ typedef struct {
   char bodies[1024];            /* how the parameters enter the bodies; "": not of this scene */
   PetscReal bytes, resident;    /* memory of a factor; of the processes now, all ranks */
   PetscReal first, next;        /* estimated seconds of a solve with a new stiffness, with the last one; on each rank */
-  PetscInt
-      body_values; /* assumed values of the parameters that change bodies, of a model of bodies; 0: no such model */
+  /* assumed values of the parameters that change bodies, of a model of bodies; 0: no such model */
+  PetscInt body_values;
   PetscReal body_training[2], body_prediction; /* estimated seconds of its training, held-out solutions included, at
                                                   least and at most; of a prediction */
   HycoFOM whole;                               /* what the names belong to */

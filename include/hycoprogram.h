@@ -179,8 +179,8 @@ const HycoOption *HycoOptionFind(const char name[]);
 const char *HycoOptionNearest(const char word[], const HycoOptionList *more);
 /* Fails for the former name of an option, with its present name. */
 PetscErrorCode HycoOptionsCheckName(const char name[]);
-/* Whether a name (without the dash) has the prefix of hyco's Tao, KSP, PC, MUMPS or SVD ("hyco_tao_", ...), and whether one of them reads it:
-   found by such objects with this option alone. Not collective. */
+/* Whether a name (without the dash) has the prefix of hyco's Tao, KSP, PC, MUMPS or SVD ("hyco_tao_", ...), and whether
+   one of them reads it: found by such objects with this option alone. Not collective. */
 PetscErrorCode HycoOptionsOfSolver(const char name[], PetscBool *prefix, PetscBool *reads);
 /* Whether an option's name (without dash) begins like an entry of a scene. */
 PetscBool HycoIsSceneKey(const char name[]);

@@ -50,8 +50,8 @@ PetscErrorCode HycoROMComparePath(HycoROM model, HycoFOM fom, PetscInt n, const 
    PETSC_INFINITY if a solve did not converge. */
 typedef struct {
   PetscInt n, not_converged;
-  PetscInt
-      loose; /* points at which the position of a body is arbitrary (HycoPrediction): displacements are not judged there */
+  PetscInt loose; /* points at which the position of a body is arbitrary (HycoPrediction): displacements are not judged
+                there */
   PetscReal largest[HYCO_N_ERRORS], median[HYCO_N_ERRORS], mean[HYCO_N_ERRORS];
   PetscInt worst[HYCO_N_ERRORS]; /* the point with the largest */
   PetscReal end[HYCO_N_ERRORS];  /* for paths, the largest at their last listed time; otherwise 0 */
@@ -70,8 +70,8 @@ typedef struct {
   PetscBool whole;   /* the whole mesh as the RID */
   const char *plane; /* group of a plane of symmetry whose cells are in the RID; NULL: none. Borrowed from the scene */
   PetscReal ridge;   /* hybrid all: of the interface's regression, as training has found it; < 0: not yet */
-  const char
-      *variant; /* of a type whose model can be made in several ways; NULL: its default. Borrowed from the type */
+  /* of a type whose model can be made in several ways; NULL: its default. Borrowed from the type */
+  const char *variant;
 } HycoReducerSettings;
 
 /* Describes settings: "hybrid, pod_tol 1e-10, hybrid contact, layers 1, contact extension 2.5". */
@@ -172,8 +172,8 @@ PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *re
 PetscErrorCode HycoReducerDestroy(HycoReducer *reducer);
 /* Reads the options of a model and its training (hyco train -help) from the scene's options. Collective. */
 PetscErrorCode HycoReducerSetFromOptions(HycoReducer reducer);
-/* -hyco_model_type, -hyco_pod_tol (from 0 to 1), -hyco_rid_layers (0 or more): as given by an option, so that a search keeps
-   them. HycoReducerSetFromOptions() replaces them if the option is given. */
+/* -hyco_model_type, -hyco_pod_tol (from 0 to 1), -hyco_rid_layers (0 or more): as given by an option, so that a search
+   keeps them. HycoReducerSetFromOptions() replaces them if the option is given. */
 PetscErrorCode HycoReducerSetModelType(HycoReducer reducer, HycoROMType type);
 PetscErrorCode HycoReducerSetPODTolerance(HycoReducer reducer, PetscReal tol);
 PetscErrorCode HycoReducerSetRIDLayers(HycoReducer reducer, PetscInt layers);
@@ -193,9 +193,9 @@ PetscErrorCode HycoReducerGetSolving(HycoReducer reducer, const char *what[]);
 typedef PetscErrorCode (*HycoPhaseMonitor)(const char phase[], PetscInt done, PetscInt n, void *ctx);
 PetscErrorCode HycoReducerSetPhaseMonitor(HycoReducer reducer, HycoPhaseMonitor monitor, void *ctx);
 /* Solves the held-out points (HycoReducerSetValidation()) and, unless a type is accurate without them, the missing
-   samples, reduces, and writes the model to `path` (under a temporary name, then renamed). Collective. `training` may be
-   NULL. Fails if the errors of the model on its training solutions reach one half and, unless -hyco_keep_singular, if
-   its reduced stiffness is singular inside the parameters' ranges. */
+   samples, reduces, and writes the model to `path` (under a temporary name, then renamed). Collective. `training` may
+   be NULL. Fails if the errors of the model on its training solutions reach one half and, unless -hyco_keep_singular,
+   if its reduced stiffness is singular inside the parameters' ranges. */
 PetscErrorCode HycoReducerRun(HycoReducer reducer, HycoSamples samples, const char path[], HycoTraining *training);
 
 /* Sets the held-out points, none of which may be a training point; they must outlive the training. NULL (the default):

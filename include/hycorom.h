@@ -36,7 +36,8 @@ extern const char *const HycoFeatureNames[];
 typedef struct {
   char type[32], title[64]; /* the type and its title; arrays, so that ranks can send the struct */
   PetscInt n_multipliers;   /* force unknowns: n_contacts, or the force vectors of a projection-based model */
-  /* Reduced unknowns (modes + FE unknowns); contacts in the RID, and those of them that may close, as in HycoSummary. */
+  /* Reduced unknowns (modes + FE unknowns); contacts in the RID, and those of them that may close, as in
+     HycoSummary. */
   PetscInt n_dof, n_contacts, n_modes, n_fe_dofs, n_facing;
   PetscReal overlap, sliding; /* as in HycoSummary, of the RID's contacts */
   /* Contacts on the whole surface; those with a force, there and in the RID. */
@@ -65,10 +66,10 @@ typedef struct {
      more than HYCO_UNSEEN, so that displacements, stresses and reactions do not follow the forces. */
   PetscReal inconsistency;
   PetscBool inconsistent;
-  /* What the loads and contact forces on a body, with all that its supports can carry, miss of the balance of forces and
-     moments: along each motion that the supports leave free, relative to the sum of the magnitudes there, the largest, of a
-     path of all listed times; < 0: not compared, as supports carry whatever is left. unbalanced: it is larger than the
-     estimated error of the contact forces. */
+  /* What the loads and contact forces on a body, with all that its supports can carry, miss of the balance of forces
+     and moments: along each motion that the supports leave free, relative to the sum of the magnitudes there, the
+     largest, of a path of all listed times; < 0: not compared, as supports carry whatever is left. unbalanced: it is
+     larger than the estimated error of the contact forces. */
   PetscReal balance;
   PetscBool unbalanced;
   /* How much larger than at all held-out points an indicator of the errors is, at least 1, and its index in
@@ -84,14 +85,14 @@ typedef struct {
   HycoReason reason;
   HycoSeconds seconds;
   PetscInt n_dependent; /* bodies: as in HycoSummary; else -1. If > 0, the contact forces have no estimate */
-  PetscBool
-      loose; /* bodies: the contact forces leave a motion of a body free, along which its position is arbitrary; on a path at
-                           a listed time with forces, with friction also at a time before. Displacements, outputs of them and
-                           the work of friction then have no estimate */
-  char why
-      [512]; /* bodies: which motion of a body the loads have work on, of a reason below 0; "": HycoReasonName() says all */
-  char free_motion
-      [512]; /* where `loose` is set: its body, as far as known its direction, on a path the times; as in HycoSummary */
+  /* bodies: the contact forces leave a motion of a body free, along which its position is arbitrary; on a path at a
+     listed time with forces, with friction also at a time before. Displacements, outputs of them and the work of
+     friction then have no estimate */
+  PetscBool loose;
+  /* bodies: which motion of a body the loads have work on, of a reason below 0; "": HycoReasonName() says all */
+  char why[512];
+  /* where `loose` is set: its body, as far as known its direction, on a path the times; as in HycoSummary */
+  char free_motion[512];
 } HycoPrediction;
 
 /* Result of the scan for a singular reduced stiffness in the parameters' ranges. */
@@ -111,8 +112,8 @@ PetscErrorCode HycoROMDestroy(HycoROM *model);
   Creates another handle on the same model, as DMClone() does for meshes: what the file holds exists once, and each
   handle has its own options, last prediction and work space, so that several predictions live side by side; each is
   bitwise that of a model that was loaded alone. The caller owns it, and may destroy the two in any order. Not
-  collective. The scene is shared too, so that HycoROMSetExtrapolate() is for all of them. Not for several threads, of which
-  the scene's expressions and Debian's PETSc know nothing: use processes.
+  collective. The scene is shared too, so that HycoROMSetExtrapolate() is for all of them. Not for several threads, of
+  which the scene's expressions and Debian's PETSc know nothing: use processes.
 */
 PetscErrorCode HycoROMClone(HycoROM model, HycoROM *clone);
 /* Borrowed from the library. */
@@ -146,9 +147,10 @@ PetscErrorCode HycoROMGetSizes(HycoROM model, PetscInt *n_contacts, PetscInt *n_
 PetscErrorCode HycoROMSolveMany(HycoROM model, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
                                 HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[]);
 /*
-  HycoROMSolveMany() divided over the ranks of comm. Each rank has loaded the model. If all give the same n, mu, arrays and
-  model, each solves a share of consecutive points and receives the results of all, and an error on a rank is one on all of
-  them. Otherwise each rank solves its own points, and receives their results and errors alone. Collective on comm.
+  HycoROMSolveMany() divided over the ranks of comm. Each rank has loaded the model. If all give the same n, mu, arrays
+  and model, each solves a share of consecutive points and receives the results of all, and an error on a rank is one on
+  all of them. Otherwise each rank solves its own points, and receives their results and errors alone. Collective on
+  comm.
 */
 PetscErrorCode HycoROMSolveShared(MPI_Comm comm, HycoROM model, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
                                   HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[]);
@@ -203,11 +205,11 @@ PetscErrorCode HycoROMGetTrainingCost(HycoROM model, PetscReal *cpu);
 /* Gets the summary of the last prediction, with estimated errors. Fails before the first prediction. */
 PetscErrorCode HycoROMGetPrediction(HycoROM model, HycoPrediction *prediction);
 /*
-  Gets the gradient of the model's outputs at the last prediction (hycofom.h), by the linear system of its closed contacts
-  and differences of the model's data, never of predictions; of paths but those of bodies, by differences of two paths for
-  each parameter in their steps. The prediction stays. Not collective. Fails without an output or a parameter, for a type without gradients,
-  where the solve did not converge or a path did not end, and where the forces of closed contacts are not unique; after an
-  error there is no last prediction.
+  Gets the gradient of the model's outputs at the last prediction (hycofom.h), by the linear system of its closed
+  contacts and differences of the model's data, never of predictions; of paths but those of bodies, by differences of
+  two paths for each parameter in their steps. The prediction stays. Not collective. Fails without an output or a
+  parameter, for a type without gradients, where the solve did not converge or a path did not end, and where the forces
+  of closed contacts are not unique; after an error there is no last prediction.
 */
 PetscErrorCode HycoROMGetGradient(HycoROM model, HycoGradient *gradient);
 
@@ -226,12 +228,13 @@ typedef struct {
 #define HYCO_FIT_BLMVM "blmvm"
 /*
   Finds the parameters within the ranges at which n outputs of the model are closest to targets, output[n] their indices
-  (of a path at its last listed time; n_outputs more: their largest over the listed times, path_quantity): the least squares of (output - target) / |target| (a target of 0: over the largest output at the samples), on the model's
-  gradients by the TAO type `type`, then by the other one if that ends at no minimum. It minimises from the n_starts best
-  of n_samples predictions (n_starts, if these are more) over the ranges, or (start: not NULL) from there alone. held[n_parameters]: values within the
-  ranges that parameters keep, NaN: it is free; NULL: all are. mu[n_parameters] is the best answer, and
-  the last prediction the one there. Not collective; on several ranks answers may differ in the last bits. Fails where
-  HycoROMGetGradient() does, and if no prediction at a start converges.
+  (of a path at its last listed time; n_outputs more: their largest over the listed times, path_quantity): the least
+  squares of (output - target) / |target| (a target of 0: over the largest output at the samples), on the model's
+  gradients by the TAO type `type`, then by the other one if that ends at no minimum. It minimises from the n_starts
+  best of n_samples predictions (n_starts, if these are more) over the ranges, or (start: not NULL) from there alone.
+  held[n_parameters]: values within the ranges that parameters keep, NaN: it is free; NULL: all are. mu[n_parameters] is
+  the best answer, and the last prediction the one there. Not collective; on several ranks answers may differ in the
+  last bits. Fails where HycoROMGetGradient() does, and if no prediction at a start converges.
 */
 PetscErrorCode HycoROMFit(HycoROM model, PetscInt n, const PetscInt output[], const PetscReal target[],
                           const PetscReal start[], const PetscReal held[], PetscInt n_samples, PetscInt n_starts,
@@ -287,9 +290,10 @@ typedef struct {
 PetscErrorCode HycoROMCompare(HycoROM model, HycoFOM fom, HycoErrors *errors);
 
 /*
-  A program of its own for the predictions of a model, in a format of an extension or of a caller: an exporter writes it to
-  `path`, completely or not at all, and describes it in lines of text that the caller frees (PetscFree). HycoROMExport() fails
-  where the format is not known, and in one line that names what the format cannot hold of this model. Not collective.
+  A program of its own for the predictions of a model, in a format of an extension or of a caller: an exporter writes it
+  to `path`, completely or not at all, and describes it in lines of text that the caller frees (PetscFree).
+  HycoROMExport() fails where the format is not known, and in one line that names what the format cannot hold of this
+  model. Not collective.
 */
 typedef PetscErrorCode (*HycoExporter)(HycoROM model, const char path[], char **description);
 PetscErrorCode HycoExporterRegister(const char format[], HycoExporter write);

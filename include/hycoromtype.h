@@ -36,7 +36,8 @@ typedef struct {
   PetscBool uniform; /* its errors do not follow the features: the estimates are a multiple of their largest at held-out
                         points, and no less than those of ops->estimate */
   PetscBool own_modes; /* its modes are displacements of its own: solutions choose only the cells of its mesh, for which
-                            those at held-out points serve, and a search tries it before the training points are solved */
+                            those at held-out points serve, and a search tries it before the training points are
+                            solved */
   PetscBool integrals; /* it takes contacts whose rows are integrals, with any number of masters (type mortar) */
   PetscBool friction;  /* it takes contacts with friction */
   PetscBool cells;     /* its mesh consists of the cells that it chooses, and of the surfaces of contacts and, without
@@ -63,21 +64,23 @@ typedef struct _HycoROMOps {
   PetscErrorCode (*local)(HycoROM, HycoLocal *);
   PetscErrorCode (*features)(HycoROM, PetscReal misfit[2]); /* features that indicate its errors, >= 0 */
   PetscErrorCode (*estimate)(HycoROM, HycoPrediction *);    /* its errors, without held-out points */
-  /* gradients; without `residual` the type has none. Its problem is w = q + M z, z = (x, L): w = 0 for the p unknowns x,
-     0 <= w complementary to the n forces L >= 0. Of paths: of a step from rest of elastic bodies, mu with the time, with
-     friction L by row (tangents follow the normal of their contact) */
+  /* gradients; without `residual` the type has none. Its problem is w = q + M z, z = (x, L): w = 0 for the p unknowns
+     x, 0 <= w complementary to the n forces L >= 0. Of paths: of a step from rest of elastic bodies, mu with the time,
+     with friction L by row (tangents follow the normal of their contact) */
   PetscErrorCode (*unknowns)(HycoROM, PetscInt *p, PetscInt *n, PetscReal z[]); /* z (p + n) of the last solve; NULL:
                                                                                    only the sizes */
   PetscErrorCode (*residual)(HycoROM, const PetscReal mu[], const PetscReal z[], PetscReal w[],
                              PetscReal *size); /* moves the data to mu (NULL: they are there) and takes z; w (p + n;
                                                   NULL: not needed); size: of gaps and displacements of the contacts */
-  PetscErrorCode (*stand)(HycoROM, PetscInt k, PetscInt listed,
-                          PetscBool *able); /* NULL, or of paths; able: the problem becomes that of accepted step k, the
-                                               listed time `listed` (-1: none), whose parameters and forces the model has;
-                                               k < 0: only asks. With friction or laws with a past, for each step from the first one on */
+  PetscErrorCode (*linearise)(
+      HycoROM, PetscInt k, PetscInt listed,
+      PetscBool *able); /* NULL, or of paths; able: the problem becomes that of accepted step k, the
+                                               listed time `listed` (-1: none), whose parameters and forces the model
+                                               has; k < 0: only asks. With friction or laws with a past, for each step
+                                               from the first one on */
   PetscErrorCode (*jacobian)(HycoROM, PetscInt k, const PetscInt contact[],
                              PetscReal M[]); /* of x and these k forces, p + k square by columns, at the last mu */
-  PetscErrorCode (*beside)(
+  PetscErrorCode (*perturbed)(
       HycoROM, const PetscReal mu[], PetscInt n, const PetscInt contact[], PetscBool rows, const PetscReal z[],
       PetscInt point, PetscReal w[]); /* NULL, or in place of `residual` beside the last prediction: w of z to the first
                                          order, of n contacts; rows: theirs change, and are those that the model has at
@@ -85,13 +88,14 @@ typedef struct _HycoROMOps {
   PetscErrorCode (*slope)(HycoROM, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
                           const PetscInt point[2], const PetscReal dz[], const PetscBool modes[],
                           const PetscBool dofs[], PetscReal dgamma[],
-                          PetscReal dU[]); /* with `beside`: the derivatives of the modes' coefficients and of the
+                          PetscReal dU[]); /* with `perturbed`: the derivatives of the modes' coefficients and of the
                                               full-order displacements, for those of the data (the weighted sum of the
-                                              changes at two points) and of z; modes (l), dofs (of mesh): which of them are wanted */
-  /* then: of the step that `stand` took. Its row of the normal, by contact, w with no slip before (p + n), and
+                                              changes at two points) and of z; modes (l), dofs (of mesh): which of them
+                                              are wanted */
+  /* then: of the step that `linearise` took. Its row of the normal, by contact, w with no slip before (p + n), and
      size as of `residual` */
-  PetscErrorCode (*rest)(HycoROM, const PetscInt **row, PetscReal w[], PetscReal *size);
-  PetscErrorCode (*along)(
+  PetscErrorCode (*step_residual)(HycoROM, const PetscInt **row, PetscReal w[], PetscReal *size);
+  PetscErrorCode (*sensitivity)(
       HycoROM, PetscInt parameter, const PetscReal weight[3], const PetscInt point[3], const PetscReal q[],
       PetscReal dz[], PetscBool *regular); /* the derivative of z from q of that w, and from those of the steps before;
                                               regular: the states of contacts and laws determine it */
@@ -110,8 +114,8 @@ PetscErrorCode HycoROMRegister(const char name[], PetscErrorCode (*create)(HycoR
  */
 PetscErrorCode HycoROMSetOps(HycoROM model, const HycoROMOps *ops, const HycoROMTraits *traits, void *data);
 PetscErrorCode HycoROMGetData(HycoROM model, void *data);
-/* What setup and solve of the type change: traits.work bytes, zeros before setup and NULL without it; freed after reset.
-   The data do not change after build and load: other handles on the model (HycoROMClone()) use the same. */
+/* What setup and solve of the type change: traits.work bytes, zeros before setup and NULL without it; freed after
+   reset. The data do not change after build and load: other handles on the model (HycoROMClone()) use the same. */
 PetscErrorCode HycoROMGetWork(HycoROM model, void *work);
 /* Sets the type of a model that has none yet. Fails for an unknown type, with the registered names. */
 PetscErrorCode HycoROMSetType(HycoROM model, HycoROMType type);

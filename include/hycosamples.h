@@ -51,8 +51,8 @@ PetscErrorCode HycoSamplesAddFile(HycoSamples samples, const char path[]);
   parameters are not, groups of `together` >= 1 successive points share its value. Without parameters that vary there
   are no such points. The caller owns *unseen. Not collective.
 */
-PetscErrorCode HycoSamplesUnseen(HycoSamples samples, PetscInt first, PetscInt count, PetscInt together,
-                                 const PetscBool slow[], HycoSamples *unseen);
+PetscErrorCode HycoSamplesOutsideTraining(HycoSamples samples, PetscInt first, PetscInt count, PetscInt together,
+                                          const PetscBool slow[], HycoSamples *unseen);
 /* The points of `samples` that are not in `seen`, in their order. The caller owns *rest. Not collective. */
 PetscErrorCode HycoSamplesExcept(HycoSamples samples, HycoSamples seen, HycoSamples *rest);
 

@@ -40,11 +40,11 @@ PetscErrorCode HycoSceneGetParameters(HycoScene scene, PetscInt *n, const char *
    collective. Borrowed. */
 #define HYCO_MAX_QUANTITIES 16
 PetscErrorCode HycoSceneGetQuantities(HycoScene scene, PetscInt *n, const char *names[HYCO_MAX_QUANTITIES]);
-/* Gets their units in the same order, products of those of `scene: unit`: "N mm" of a moment; "": not known, as of areas. Not
-   collective. Borrowed. */
+/* Gets their units in the same order, products of those of `scene: unit`: "N mm" of a moment; "": not known, as of
+   areas. Not collective. Borrowed. */
 PetscErrorCode HycoSceneGetQuantityUnits(HycoScene scene, PetscInt *n, const char *units[HYCO_MAX_QUANTITIES]);
-/* Whether output q is of displacements, or of friction: it is arbitrary where the position of a body is (HycoPrediction.loose). Not
-   collective. */
+/* Whether output q is of displacements, or of friction: it is arbitrary where the position of a body is
+   (HycoPrediction.loose). Not collective. */
 PetscBool HycoSceneQuantityIsOfPosition(HycoScene scene, PetscInt q);
 /* at[k]: the number in `other` of the scene's output k, by name and definition; -1: `other` does not have it. Not
    collective. */

@@ -62,8 +62,8 @@ PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver);
 PetscErrorCode HycoSolverDestroy(HycoSolver *solver);
 /* Sets (references) the system. */
 PetscErrorCode HycoSolverSetSystem(HycoSolver solver, HycoSystem system);
-/* -hyco_solver_type. A solve of a system with other cones than forces >= 0 (HycoSystemSetBlocks()) refuses each type but
-   semismooth, which has no fallback there, and each form but dual and that of a given flexibility. */
+/* -hyco_solver_type. A solve of a system with other cones than forces >= 0 (HycoSystemSetBlocks()) refuses each type
+   but semismooth, which has no fallback there, and each form but dual and that of a given flexibility. */
 PetscErrorCode HycoSolverSetType(HycoSolver solver, HycoSolverType type);
 /*
   -hyco_tao_type: for the type tao. Bound-constrained (symmetric systems): gpcg, tron, bntr, bnls, bntl, blmvm, bncg,
@@ -80,8 +80,8 @@ PetscErrorCode HycoSolverSetForm(HycoSolver solver, HycoForm form);
 PetscErrorCode HycoSolverSetLinear(HycoSolver solver, HycoLinear linear, PetscReal gigabytes);
 /* -hyco_solver_rtol: the largest relative KKT residual that counts as solved (default 1e-8). */
 PetscErrorCode HycoSolverSetTolerance(HycoSolver solver, PetscReal rtol);
-/* -hyco_solver_max_its: of the active set or TAO (0: chosen from the number of contacts; TAO 2000), or of semismooth from
-   each of its starts (0: 100). */
+/* -hyco_solver_max_its: of the active set or TAO (0: chosen from the number of contacts; TAO 2000), or of semismooth
+   from each of its starts (0: 100). */
 PetscErrorCode HycoSolverSetMaxIts(HycoSolver solver, PetscInt max_its);
 /* -hyco_solver_warm_start: start from the last solution's active set (default) or without contact. */
 PetscErrorCode HycoSolverSetWarmStart(HycoSolver solver, PetscBool warm);
@@ -90,8 +90,8 @@ PetscErrorCode HycoSolverSetWarmStart(HycoSolver solver, PetscBool warm);
 PetscErrorCode HycoSolverSetMultilevel(HycoSolver solver, PetscBool multilevel);
 /*
   -hyco_solver_fallback: if the residuals of the chosen method are too large, try the next (default): the active set,
-  Lemke's method, TAO's gpcg and tron (for a nonsymmetric system ssils); Lemke's method after TAO's types if the form has
-  no dense problem. Otherwise such a solve does not converge.
+  Lemke's method, TAO's gpcg and tron (for a nonsymmetric system ssils); Lemke's method after TAO's types if the form
+  has no dense problem. Otherwise such a solve does not converge.
 */
 PetscErrorCode HycoSolverSetFallback(HycoSolver solver, PetscBool fallback);
 /* Sets the prefix of its options: with "other_", -other_hyco_solver_rtol. */

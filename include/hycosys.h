@@ -33,10 +33,10 @@ PETSC_EXTERN PetscClassId HYCO_SCENE_CLASSID, HYCO_SAMPLES_CLASSID, HYCO_SYSTEM_
 PetscErrorCode HycoInitializePackage(void);
 
 /*
-  hyco's types of Tao, for any program: TaoSetType(tao, HYCO_TAO_ACTIVE_SET) or -tao_type. They minimise f(x), lo <= x <=
-  hi (TaoSetVariableBounds()), by TaoSetObjectiveAndGradient() and TaoSetHessian(), on any number of ranks; a quadratic f
-  exactly, others by Newton's method with a line search. The iterations are sets (pivots). Without an objective the
-  gradient may be any function with H as Jacobian, so that H need not be symmetric.
+  hyco's types of Tao, for any program: TaoSetType(tao, HYCO_TAO_ACTIVE_SET) or -tao_type. They minimise f(x), lo <= x
+  <= hi (TaoSetVariableBounds()), by TaoSetObjectiveAndGradient() and TaoSetHessian(), on any number of ranks; a
+  quadratic f exactly, others by Newton's method with a line search. The iterations are sets (pivots). Without an
+  objective the gradient may be any function with H as Jacobian, so that H need not be symmetric.
   - active set: H may be indefinite only outside the free unknowns' blocks, whose factor is that of TaoGetKSP()
     (-tao_ksp_type, -tao_pc_type): LU, by MUMPS on several ranks; conjugate gradients for a matrix without entries
   - lemke: H is gathered on every rank as a dense matrix; each lo is finite, each hi infinite
@@ -45,9 +45,9 @@ PetscErrorCode HycoInitializePackage(void);
 #define HYCO_TAO_ACTIVE_SET "hyco_active_set"
 #define HYCO_TAO_LEMKE      "hyco_lemke"
 
-/* Initialises PETSc (if needed), SLEPc and hyco's package. Collective on all processes. `argc`, `argv` may be NULL. If it
-   initialises PETSc, errors are printed as one line on stderr, "hyco: error: ...". HYCO_TRACE=1 in the environment, or
-   PetscPushErrorHandler(PetscTraceBackErrorHandler, NULL), adds PETSc's call stack. */
+/* Initialises PETSc (if needed), SLEPc and hyco's package. Collective on all processes. `argc`, `argv` may be NULL. If
+   it initialises PETSc, errors are printed as one line on stderr, "hyco: error: ...". HYCO_TRACE=1 in the environment,
+   or PetscPushErrorHandler(PetscTraceBackErrorHandler, NULL), adds PETSc's call stack. */
 PetscErrorCode HycoInitialize(int *argc, char ***argv);
 /* Finalises what HycoInitialize() initialised. Collective on all processes. */
 PetscErrorCode HycoFinalize(void);

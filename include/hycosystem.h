@@ -63,9 +63,9 @@ PetscErrorCode HycoSystemSetVectors(HycoSystem system, Vec F, Vec D);
 /* The vectors; each output may be NULL. Not collective. Borrowed. */
 PetscErrorCode HycoSystemGetVectors(HycoSystem system, Vec *F, Vec *D);
 /*
-  Sets (references) a flexibility instead of K: w = g + G L >= 0 complementary to L >= 0, G = B K^-1 Bt m x m, dense, on one process, symmetric positive semidefinite, g = D - B K^-1 F. Such a system has no
-  displacements (x is NULL in a solve) and no stationarity. Replaces the matrices, and is replaced by
-  HycoSystemSetMatrices().
+  Sets (references) a flexibility instead of K: w = g + G L >= 0 complementary to L >= 0, G = B K^-1 Bt m x m, dense, on
+  one process, symmetric positive semidefinite, g = D - B K^-1 F. Such a system has no displacements (x is NULL in a
+  solve) and no stationarity. Replaces the matrices, and is replaced by HycoSystemSetMatrices().
 */
 PetscErrorCode HycoSystemSetFlexibility(HycoSystem system, Mat G, Vec g);
 /*

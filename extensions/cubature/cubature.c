@@ -49,7 +49,7 @@ static PetscErrorCode ResetTraining(HycoReducer t)
 }
 
 /* All checks before the first solution is computed, which may take hours. */
-static PetscErrorCode Begin(HycoReducer t)
+static PetscErrorCode CubatureBegin(HycoReducer t)
 {
   const PetscBool vectors = (PetscBool)(((HycoCubatureTraining)t->training)->forces.dual != HYCO_DUAL_FE);
 
@@ -64,7 +64,7 @@ static PetscErrorCode Begin(HycoReducer t)
 }
 
 /* The modes of the force basis, then the cells. Collective. */
-static PetscErrorCode Modes(HycoReducer t, HycoSnapshots store)
+static PetscErrorCode CubatureModes(HycoReducer t, HycoSnapshots store)
 {
   HycoCubatureTraining c = (HycoCubatureTraining)t->training;
   PetscReal *sigma;
@@ -99,7 +99,7 @@ static void TakeContact(HycoROM m)
 }
 
 /* Every node is in A, and every contact belongs to the model; sets the cells' weights. */
-static PetscErrorCode Build(HycoROM m, HycoReducer t)
+static PetscErrorCode CubatureBuild(HycoROM m, HycoReducer t)
 {
   const HycoCubatureTraining c = (HycoCubatureTraining)t->training;
   HycoCubatureModel r = (HycoCubatureModel)m->model->data;
@@ -139,7 +139,7 @@ static void DescribeContact(HycoROM m, char text[WORDS])
 }
 
 /* On the rank that has the model. */
-static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
+static PetscErrorCode CubatureReport(HycoReducer t, HycoROM m, HycoTraining *r)
 {
   const HycoCubatureModel c = (HycoCubatureModel)m->model->data;
   char contact[WORDS];
@@ -168,7 +168,7 @@ static PetscErrorCode SetUp(HycoROM m)
 }
 
 /* The range of the weights shows whether few cells stand for many: a cell may represent thousands. */
-static PetscErrorCode View(HycoROM m, PetscViewer viewer)
+static PetscErrorCode CubatureView(HycoROM m, PetscViewer viewer)
 {
   const HycoCubatureModel c = (HycoCubatureModel)m->model->data;
   PetscReal least = PETSC_MAX_REAL, most = 0;
@@ -192,7 +192,7 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 }
 
 /* Writes to the model file, or reads from it. */
-static PetscErrorCode Move(HycoROM m, HycoH5 h)
+static PetscErrorCode CubatureMove(HycoROM m, HycoH5 h)
 {
   HycoCubatureModel c = (HycoCubatureModel)m->model->data;
 
@@ -206,7 +206,7 @@ static PetscErrorCode Move(HycoROM m, HycoH5 h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Destroy(HycoROM m)
+static PetscErrorCode CubatureDestroy(HycoROM m)
 {
   PetscFunctionBegin;
   PetscCall(PetscFree(((HycoCubatureModel)m->model->data)->weight));
@@ -215,7 +215,7 @@ static PetscErrorCode Destroy(HycoROM m)
 }
 
 /* With a stiffness and a history, like the hybrid model; cells: its mesh is not a connected part. */
-static PetscErrorCode Create(HycoROM m)
+static PetscErrorCode CubatureCreate(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "cubature",
                                        .work = sizeof(struct _n_HycoGalerkin),
@@ -229,10 +229,10 @@ static PetscErrorCode Create(HycoROM m)
                                  .solve = HycoGalerkinSolve,
                                  .energy = HycoGalerkinEnergy,
                                  .condition = HycoGalerkinCondition,
-                                 .view = View,
-                                 .save = Move,
-                                 .load = Move,
-                                 .destroy = Destroy};
+                                 .view = CubatureView,
+                                 .save = CubatureMove,
+                                 .load = CubatureMove,
+                                 .destroy = CubatureDestroy};
   HycoCubatureModel c;
 
   PetscFunctionBegin;
@@ -248,21 +248,21 @@ static PetscErrorCode CreateTrainer(HycoTrainerOps *ops)
   PetscFunctionBegin;
   *ops = (HycoTrainerOps){.setfromoptions = SetFromOptions,
                           .reset = ResetTraining,
-                          .begin = Begin,
-                          .modes = Modes,
-                          .build = Build,
+                          .begin = CubatureBegin,
+                          .modes = CubatureModes,
+                          .build = CubatureBuild,
                           .finish = HycoGalerkinFinish,
-                          .report = Report,
+                          .report = CubatureReport,
                           .cost = HycoGalerkinCost};
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Register(void)
+static PetscErrorCode CubatureRegister(void)
 {
   PetscFunctionBegin;
-  PetscCall(HycoROMRegister(HYCO_ROM_CUBATURE, Create));
+  PetscCall(HycoROMRegister(HYCO_ROM_CUBATURE, CubatureCreate));
   PetscCall(HycoTrainerRegister(HYCO_ROM_CUBATURE, CreateTrainer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-HycoDefineExtension(cubature, Register())
+HycoDefineExtension(cubature, CubatureRegister())

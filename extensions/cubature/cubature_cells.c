@@ -2,7 +2,7 @@
 #include "cubature.h"
 
 /* Stores the cells with positive weights on every rank. Collective; w: on rank 0. */
-static PetscErrorCode Take(HycoReducer t, const PetscReal w[])
+static PetscErrorCode CubatureCellsStore(HycoReducer t, const PetscReal w[])
 {
   HycoCubatureTraining c = (HycoCubatureTraining)t->training;
   const PetscInt n_cells = t->sizes[1];
@@ -35,7 +35,7 @@ PetscErrorCode HycoCubatureChooseAll(HycoReducer t)
   PetscCall(PetscMalloc1(t->sizes[1], &w));
   for (PetscInt e = 0; e < t->sizes[1]; e++) w[e] = 1;
   c->error[0] = c->error[1] = 0;
-  PetscCall(Take(t, w));
+  PetscCall(CubatureCellsStore(t, w));
   PetscCall(PetscFree(w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -54,7 +54,7 @@ PetscErrorCode HycoCubatureChoose(HycoReducer t, Mat W, PetscInt n, const PetscR
                  "the error of the cubature is %.1e in the internal forces of training and %.1e in a body's volume; "
                  "use another -hyco_cubature_tol, or fewer modes (-hyco_pod_tol)",
                  (double)c->error[0], (double)c->error[1]);
-  PetscCall(Take(t, t->rank ? NULL : w));
+  PetscCall(CubatureCellsStore(t, t->rank ? NULL : w));
   PetscCall(PetscFree(w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -22,8 +22,8 @@ static PetscErrorCode TakeAll(HycoReducer t, PetscBool take[])
 }
 
 /* The largest entry of a row, those of the slave first; -1: none is free. */
-static PetscInt Largest(HycoFE fe, PetscInt slave, PetscInt n, const PetscInt dof[], const PetscReal value[],
-                        const PetscBool take[])
+static PetscInt CubatureContactLargest(HycoFE fe, PetscInt slave, PetscInt n, const PetscInt dof[],
+                                       const PetscReal value[], const PetscBool take[])
 {
   PetscInt best = -1;
 
@@ -49,8 +49,8 @@ static PetscErrorCode TakeOneEach(HycoReducer t, PetscBool take[])
   PetscCall(HycoContactRows(fe, &t->fom->pairs, &rows));
   for (PetscInt k = 0; k < pairs->n; k++) {
     const PetscInt first = rows.start[k];
-    const PetscInt dof =
-        Largest(fe, HycoPairsSlave(pairs, k), rows.start[k + 1] - first, rows.dof + first, rows.value + first, take);
+    const PetscInt dof = CubatureContactLargest(fe, HycoPairsSlave(pairs, k), rows.start[k + 1] - first,
+                                                rows.dof + first, rows.value + first, take);
 
     if (dof >= 0) take[dof] = PETSC_TRUE;
   }

@@ -43,7 +43,7 @@ static PetscErrorCode FetchModes(Sampler *s)
 }
 
 /* V gamma of column k of the snapshots. */
-static PetscErrorCode Displacement(void *ctx, PetscInt k, PetscReal u[])
+static PetscErrorCode CubatureSampleDisplacement(void *ctx, PetscInt k, PetscReal u[])
 {
   const Sampler *s = (const Sampler *)ctx;
   const PetscInt l = s->t->l;
@@ -74,7 +74,7 @@ static void AddForce(const Sampler *s, PetscInt dof, PetscReal f, PetscReal g[])
 }
 
 /* g: V_e^T f_e of the part's cells; 0 for cells with weight 1. */
-static PetscErrorCode Project(Sampler *s)
+static PetscErrorCode CubatureSampleProject(Sampler *s)
 {
   HycoMesh m = s->fe->mesh;
   const PetscInt l = s->t->l, n = m->nv * m->dim;
@@ -96,7 +96,7 @@ static PetscErrorCode Project(Sampler *s)
 }
 
 /* Stores the l columns of a listed time. Collective. */
-static PetscErrorCode Record(void *ctx, PetscInt k)
+static PetscErrorCode CubatureSampleRecord(void *ctx, PetscInt k)
 {
   Sampler *s = (Sampler *)ctx;
   const PetscInt l = s->t->l, step = k % HycoSnapshotsSteps(s->t->scene);
@@ -104,7 +104,7 @@ static PetscErrorCode Record(void *ctx, PetscInt k)
   PetscInt lda;
 
   PetscFunctionBegin;
-  HycoOnEach(HycoComm(s->t), Project(s));
+  HycoOnEach(HycoComm(s->t), CubatureSampleProject(s));
   PetscCall(HycoFOMToRows(s->t->fom, HYCO_ON_CELLS, MPIU_REAL, l, s->g, s->rows));
   PetscCall(MatDenseGetLDA(s->J, &lda));
   PetscCall(MatDenseGetArray(s->J, &a));
@@ -117,7 +117,7 @@ static PetscErrorCode Record(void *ctx, PetscInt k)
 }
 
 /* Room for the whole part, cells and modes, as each listed time needs all of them at once. */
-static PetscErrorCode Create(HycoReducer t, Sampler *s)
+static PetscErrorCode CubatureSampleCreate(HycoReducer t, Sampler *s)
 {
   const HycoFileOrder *order;
   const PetscInt l = t->l;
@@ -130,12 +130,12 @@ static PetscErrorCode Create(HycoReducer t, Sampler *s)
   PetscCall(PetscMalloc1((size_t)t->fom->part->n_cells * (size_t)l + 1, &s->g));
   PetscCall(PetscCalloc1((size_t)s->n_rows * (size_t)l + 1, &s->rows));
   PetscCall(FetchModes(s));
-  PetscCall(HycoTrainingReplayCreate(t, Displacement, Record, s, &s->replay));
+  PetscCall(HycoTrainingReplayCreate(t, CubatureSampleDisplacement, CubatureSampleRecord, s, &s->replay));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Divides each listed time's columns by their size, or by a tenth of the largest size if that is larger. Collective. */
-static PetscErrorCode Balance(HycoReducer t, Mat J)
+static PetscErrorCode CubatureSampleBalance(HycoReducer t, Mat J)
 {
   const PetscInt l = t->l, n = HycoSnapshotsSteps(t->scene);
   PetscReal *norm, *size, largest = 0;
@@ -165,7 +165,8 @@ static PetscErrorCode Balance(HycoReducer t, Mat J)
 
 /* The singular vectors of J in *W (NULL: none; the caller owns it), as many as the tolerance takes, and the singular
    values. Collective. */
-static PetscErrorCode Decompose(HycoReducer t, Mat J, PetscReal tol, Mat *W, PetscInt *n, PetscReal **sigma)
+static PetscErrorCode CubatureSampleDecompose(HycoReducer t, Mat J, PetscReal tol, Mat *W, PetscInt *n,
+                                              PetscReal **sigma)
 {
   PetscInt cells, columns;
 
@@ -190,8 +191,8 @@ static PetscErrorCode SamplePoint(Sampler *s, HycoSnapshots store, PetscInt k, P
   PetscCall(MatCreateDense(HycoComm(t), s->n_rows, PETSC_DECIDE, t->sizes[1], HycoSnapshotsSteps(t->scene) * t->l, NULL,
                            &s->J));
   ierr = HycoTrainingReplayFollow(&s->replay, store, k);
-  if (!ierr) ierr = Balance(t, s->J);
-  if (!ierr) ierr = Decompose(t, s->J, tol, W, n, &sigma);
+  if (!ierr) ierr = CubatureSampleBalance(t, s->J);
+  if (!ierr) ierr = CubatureSampleDecompose(t, s->J, tol, W, n, &sigma);
   PetscCall(MatDestroy(&s->J));
   PetscCall(ierr);
   if (*n) {
@@ -207,7 +208,7 @@ static PetscErrorCode SamplePoint(Sampler *s, HycoSnapshots store, PetscInt k, P
 }
 
 /* Joins all points' vectors in one matrix. Collective. */
-static PetscErrorCode Join(Sampler *s, HycoSnapshots store, PetscReal tol, Mat *joined)
+static PetscErrorCode CubatureSampleJoin(Sampler *s, HycoSnapshots store, PetscReal tol, Mat *joined)
 {
   HycoReducer t = s->t;
   PetscInt points, all = 0, at = 0, *n;
@@ -246,11 +247,11 @@ PetscErrorCode HycoCubatureSample(HycoReducer t, HycoSnapshots store, PetscReal 
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(Create(t, &s));
-  ierr = Join(&s, store, SHARE * tol, &J);
+  PetscCall(CubatureSampleCreate(t, &s));
+  ierr = CubatureSampleJoin(&s, store, SHARE * tol, &J);
   PetscCall(HycoTrainingReplayDestroy(&s.replay));
   HycoFreeAll(&s.V, &s.g, &s.rows);
-  if (!ierr) ierr = Decompose(t, J, SHARE * tol, W, n, sigma);
+  if (!ierr) ierr = CubatureSampleDecompose(t, J, SHARE * tol, W, n, sigma);
   PetscCall(MatDestroy(&J));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

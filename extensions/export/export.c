@@ -1,10 +1,11 @@
 /*
   hyco export: the predictions of a model as one file of C99. The model's problem is probed through the operations that
-  gradients use: w = q + M z, and the values from which the outputs follow, are affine in z, and functions of the parameters are
-  found for their coefficients (functions.c). The runtime that the file has is also compiled here: before anything is
-  written, its predictions are compared with the model's. Of surfaces that move past each other z has the forces at the
-  places of the surfaces instead (travel.c): the search, which is no function of the parameters, is the program's own. Of
-  bodies that flow z ends with the coefficients of their modes, and the values begin with the strains of their points (flow.c).
+  gradients use: w = q + M z, and the values from which the outputs follow, are affine in z, and functions of the
+  parameters are found for their coefficients (functions.c). The runtime that the file has is also compiled here: before
+  anything is written, its predictions are compared with the model's. Of surfaces that move past each other z has the
+  forces at the places of the surfaces instead (travel.c): the search, which is no function of the parameters, is the
+  program's own. Of bodies that flow z ends with the coefficients of their modes, and the values begin with the strains
+  of their points (flow.c).
 */
 #include "flow.h"
 #include "travel.h"
@@ -37,14 +38,16 @@
 #define SAMPLES        120   /* points for the functions, of which a third checks them; more with weights of samples: */
 #define SEVERAL        20    /* samples: with more, products are tried of known functions alone */
 #define EACH           8     /* for each */
-#define NEARLY         1e-3 /* an error that more functions may remove; they are chosen from all at once at as many points: */
-#define MORE           3 /* times */
+#define NEARLY                                                                                                         \
+  1e-3         /* an error that more functions may remove; they are chosen from all at once at as many
+                               points: */
+#define MORE 3 /* times */
 
 /* A value: of an output, of a contact's force along an axis, of a stress in a cell, of a displacement, of a travel. */
 typedef struct {
   enum { QUANTITY, FORCE, CELL, NODE, TRAVEL, COEFFICIENT, AREA, STRAIN } from;
-  PetscInt index, axis,
-      group; /* group: the output to which it belongs; from n_outputs on those of a travel; -1: of contacts */
+  /* group: the output to which it belongs; from n_outputs on those of a travel; -1: of contacts */
+  PetscInt index, axis, group;
   PetscReal coefficient[6]; /* of a cell's stresses */
   PetscInt turned;          /* 1 + the body whose axes the values of a cell or node are in; 0: those of space */
 } Row;
@@ -74,7 +77,7 @@ typedef struct {
 /* -- probing -- */
 
 /* The displacement that the row names, in the axes of its body. */
-static PetscReal Component(const Export *e, const Row *r, const PetscReal u[])
+static PetscReal ExportComponent(const Export *e, const Row *r, const PetscReal u[])
 {
   const PetscInt dim = e->m->model->mesh->dim, node = r->index / dim;
   const PetscReal *Q = r->turned ? e->travel->bodies->pose[r->turned - 1].Q : NULL;
@@ -86,7 +89,7 @@ static PetscReal Component(const Export *e, const Row *r, const PetscReal u[])
 }
 
 /* The same of stresses (xx, yy, zz, xy, yz, xz). */
-static PetscReal Stress(const Export *e, const Row *r, PetscInt n, const PetscReal sigma[])
+static PetscReal ExportStress(const Export *e, const Row *r, PetscInt n, const PetscReal sigma[])
 {
   static const PetscInt at[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {0, 2}};
   const PetscReal *Q = r->turned ? e->travel->bodies->pose[r->turned - 1].Q : NULL;
@@ -128,7 +131,7 @@ static PetscReal UnitOf(const Export *e, PetscInt i)
 }
 
 /* y = (w, values) at mu for z: motions, the contacts of e->contact, alpha, in units of e->unit; NULL: 0. */
-static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[], PetscReal y[])
+static PetscErrorCode ExportProbe(Export *e, const PetscReal mu[], const PetscReal z[], PetscReal y[])
 {
   HycoROM m = e->m;
   HycoPrediction prediction = {0};
@@ -164,7 +167,7 @@ static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[]
 
     *value = r->from == QUANTITY ? prediction.quantity[r->index]
              : r->from == FORCE  ? result[r->index].force[r->axis]
-             : r->from == NODE   ? Component(e, r, u)
+             : r->from == NODE   ? ExportComponent(e, r, u)
              : r->from == TRAVEL ? HycoTravelValue(e->travel, r->index)
                                  : 0;
     if (r->from == AREA) *value = e->area[r->index];
@@ -172,7 +175,7 @@ static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[]
     if (r->from == COEFFICIENT)
       PetscCall(HycoExprEval(e->s->contact[m->pairs.contact[r->index]]->friction, mu, 1,
                              m->fe->X + 3 * m->pairs.slave[r->index], value));
-    if (r->from == CELL) *value = Stress(e, r, n_sigma, sigma + r->index * n_sigma);
+    if (r->from == CELL) *value = ExportStress(e, r, n_sigma, sigma + r->index * n_sigma);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -309,8 +312,8 @@ static PetscErrorCode AddForces(Export *e, const HycoQuantity *q, Output *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of moved surfaces: a reaction that follows from the balance of bodies is the value of the loads, against which the contacts
-   push those of[]. */
+/* Of moved surfaces: a reaction that follows from the balance of bodies is the value of the loads, against which the
+   contacts push those of[]. */
 static PetscErrorCode AddPush(Export *e, const PetscBool of[], PetscInt axis, Output *o)
 {
   const HycoPairs *pairs = &e->m->model->pairs;
@@ -430,8 +433,8 @@ static PetscErrorCode FindOutputs(Export *e)
 
 /* -- the problem -- */
 
-/* The rows of contacts with friction, and their blocks: those that a force along the normal moves, moves[] by row, without
-   tangents that nothing moves. */
+/* The rows of contacts with friction, and their blocks: those that a force along the normal moves, moves[] by row,
+   without tangents that nothing moves. */
 static PetscErrorCode FindBlocks(Export *e, const PetscReal moves[])
 {
   const HycoPairs *pairs = &e->m->model->pairs;
@@ -444,8 +447,8 @@ static PetscErrorCode FindBlocks(Export *e, const PetscReal moves[])
   PetscCall(PetscMalloc1(pairs->n + 1, &o->m.coefficient));
   PetscCall(PetscMalloc1(e->n + 1, &o->m.normal));
   for (PetscInt k = 0; k < pairs->n; k++) {
-    const PetscBool rubs = (PetscBool)(e->s->contact[pairs->contact[k]]->friction != NULL);
-    const PetscInt rows = rubs ? e->m->model->mesh->dim : 1;
+    const PetscBool has_friction = (PetscBool)(e->s->contact[pairs->contact[k]]->friction != NULL);
+    const PetscInt rows = has_friction ? e->m->model->mesh->dim : 1;
     PetscReal most = 0;
 
     e->first[k] = at;
@@ -455,14 +458,16 @@ static PetscErrorCode FindBlocks(Export *e, const PetscReal moves[])
       o->m.normal[e->k] = r == at;
       e->contact[e->k++] = r;
     }
-    if (moves[at] > 0) o->m.coefficient[o->m.n_slip++] = rubs ? (int)k : -1; /* a row's number once there are rows */
+    if (moves[at] > 0)
+      o->m.coefficient[o->m.n_slip++] = has_friction ? (int)k : -1; /* a row's number once there are rows */
     if (moves[at] > 0) o->m.row[o->m.n_slip] = (int)e->k;
     at += rows;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of a path: the largest forces of the listed times, as the last one may be without loads; displacements of their size. */
+/* Of a path: the largest forces of the listed times, as the last one may be without loads; displacements of their
+   size. */
 static void ScalePath(Export *e, const PetscReal flexibility[])
 {
   PetscReal most = 0, flexible = 0;
@@ -520,7 +525,7 @@ static PetscErrorCode FindProblem(Export *e, const PetscReal mu[])
 /* -- functions of the parameters -- */
 
 /* Some forces and motions without regularity; all forces press. */
-static void Irregular(PetscInt n, PetscInt which, PetscReal z[])
+static void ExportIrregular(PetscInt n, PetscInt which, PetscReal z[])
 {
   const PetscReal step = which ? 0.75487766624669276 : 0.61803398874989485;
 
@@ -528,7 +533,7 @@ static void Irregular(PetscInt n, PetscInt which, PetscReal z[])
 }
 
 /* n points over the ranges, the last variables of a path (time, tables) each for itself. The caller frees mu. */
-static PetscErrorCode Scatter(const Export *e, PetscInt n, PetscReal **mu)
+static PetscErrorCode ExportScatter(const Export *e, PetscInt n, PetscReal **mu)
 {
   const PetscInt n_par = e->s->n_parameters, n_var = e->s->n_variables;
   HycoSamples samples;
@@ -549,13 +554,14 @@ static PetscErrorCode Scatter(const Export *e, PetscInt n, PetscReal **mu)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Samples for a fit: y at z = 0, and what two z add; fixed: a parameter that stays in the middle of its range; -1: none. */
+/* Samples for a fit: y at z = 0, and what two z add; fixed: a parameter that stays in the middle of its range; -1:
+   none. */
 typedef struct {
   PetscInt n;
   PetscReal *mu, *y, *added; /* n x ny; n x 2 ny */
 } Samples;
 
-static PetscErrorCode Sample(Export *e, PetscInt n, PetscInt fixed, Samples *o)
+static PetscErrorCode ExportSample(Export *e, PetscInt n, PetscInt fixed, Samples *o)
 {
   const PetscInt n_par = e->s->n_variables;
   PetscReal *z;
@@ -563,7 +569,7 @@ static PetscErrorCode Sample(Export *e, PetscInt n, PetscInt fixed, Samples *o)
 
   PetscFunctionBegin;
   o->n = n;
-  PetscCall(Scatter(e, n, &o->mu));
+  PetscCall(ExportScatter(e, n, &o->mu));
   for (PetscInt i = 0; fixed >= 0 && i < n; i++) o->mu[i * n_par + fixed] = (e->s->lo[fixed] + e->s->hi[fixed]) / 2;
   PetscCall(PetscMalloc1((size_t)n * (size_t)e->ny + 1, &o->y));
   PetscCall(PetscMalloc1(2 * (size_t)n * (size_t)e->ny + 1, &o->added));
@@ -571,10 +577,10 @@ static PetscErrorCode Sample(Export *e, PetscInt n, PetscInt fixed, Samples *o)
   for (PetscInt i = 0; i < n && !ierr; i++) {
     PetscReal *y = o->y + (size_t)i * (size_t)e->ny, *added = o->added + 2 * (size_t)i * (size_t)e->ny;
 
-    ierr = Probe(e, o->mu + i * n_par, NULL, y);
+    ierr = ExportProbe(e, o->mu + i * n_par, NULL, y);
     for (PetscInt j = 0; j < 2 && !ierr; j++) {
-      Irregular(e->p + e->k + e->l, j, z);
-      ierr = Probe(e, o->mu + i * n_par, z, added + j * e->ny);
+      ExportIrregular(e->p + e->k + e->l, j, z);
+      ierr = ExportProbe(e, o->mu + i * n_par, z, added + j * e->ny);
       /* y is affine in z: the difference is M z, and T z of the values. */
       for (PetscInt r = 0; r < e->ny; r++) added[j * e->ny + r] -= y[r];
       /* The flexibility of places is in blocks, times values. */
@@ -587,7 +593,7 @@ static PetscErrorCode Sample(Export *e, PetscInt n, PetscInt fixed, Samples *o)
 }
 
 /* The scale of each group: its largest value in the samples, without forces or by them. */
-static void Scale(const Export *e, const Samples *o, PetscReal scale[])
+static void ExportScale(const Export *e, const Samples *o, PetscReal scale[])
 {
   for (PetscInt g = 0; g < e->n_groups; g++) scale[g] = 0;
   for (PetscInt i = 0; i < o->n; i++) {
@@ -598,10 +604,10 @@ static void Scale(const Export *e, const Samples *o, PetscReal scale[])
   }
 }
 
-/* Adds the functions and coefficients of some rows to fit, whose coefficients are those of all n_rows; the functions of other
-   rows have the coefficient 0. */
-static PetscErrorCode Join(const HycoExportFit *part, PetscInt n, const PetscInt row[], PetscInt n_rows,
-                           HycoExportFit *fit)
+/* Adds the functions and coefficients of some rows to fit, whose coefficients are those of all n_rows; the functions of
+   other rows have the coefficient 0. */
+static PetscErrorCode ExportJoin(const HycoExportFit *part, PetscInt n, const PetscInt row[], PetscInt n_rows,
+                                 HycoExportFit *fit)
 {
   const size_t all = (size_t)n_rows;
 
@@ -622,8 +628,8 @@ static PetscErrorCode Join(const HycoExportFit *part, PetscInt n, const PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The functions of `from` that some rows have, of the group's response, or of the flexibility of the body to whose places
-   they belong: the rows without forces have products of them. */
+/* The functions of `from` that some rows have, of the group's response, or of the flexibility of the body to whose
+   places they belong: the rows without forces have products of them. */
 static PetscErrorCode FindSeeds(Export *e, PetscInt first, const HycoExportFit *from, PetscInt *n, HycoFunction seed[])
 {
   const PetscInt from_rows = from == &e->response ? 2 * e->ny : e->ny, g = e->group[first],
@@ -671,7 +677,7 @@ static PetscErrorCode FitRows(Export *e, PetscInt last, const HycoFitData *data,
   }
   PetscCall(HycoExportFitFree(&trial));
   PetscCall(PetscFree(seed));
-  PetscCall(Join(&part, data->n_rows, data->row, data->stride, fit));
+  PetscCall(ExportJoin(&part, data->n_rows, data->row, data->stride, fit));
   if (part.worst > fit->worst || !fit->worst) {
     fit->worst = part.worst;
     fit->worst_row = part.worst_row;
@@ -681,7 +687,7 @@ static PetscErrorCode FitRows(Export *e, PetscInt last, const HycoFitData *data,
 }
 
 /* Of all rows at once, or where surfaces move of each group, whose values have few functions of the many. */
-static PetscErrorCode Fit(Export *e, PetscInt last, HycoFitData data, HycoExportFit *fit)
+static PetscErrorCode ExportFit(Export *e, PetscInt last, HycoFitData data, HycoExportFit *fit)
 {
   PetscInt *row;
 
@@ -708,21 +714,22 @@ static PetscErrorCode FitBoth(Export *e, PetscInt fixed, PetscInt times)
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(e->n_groups, &scale));
-  PetscCall(Sample(e, times * PetscMax(SAMPLES, EACH * e->n_weights), fixed, &o));
+  PetscCall(ExportSample(e, times * PetscMax(SAMPLES, EACH * e->n_weights), fixed, &o));
   PetscCall(PetscMalloc1((size_t)o.n * (size_t)e->atoms.n + 1, &value));
   PetscCall(HycoAtomsTabulate(e->s, &e->atoms, o.n, o.mu, value));
-  Scale(e, &o, scale);
-  PetscCall(Fit(e, e->travel ? HYCO_FIT_LEVELS - 2 : 1,
-                (HycoFitData){o.n, e->atoms.n, 2 * e->ny, 0, value, o.added, NULL, e->group, scale}, &e->response));
+  ExportScale(e, &o, scale);
+  PetscCall(ExportFit(e, e->travel ? HYCO_FIT_LEVELS - 2 : 1,
+                      (HycoFitData){o.n, e->atoms.n, 2 * e->ny, 0, value, o.added, NULL, e->group, scale},
+                      &e->response));
   /* If the response has no functions the export is refused anyway: the costly levels are left out. */
-  PetscCall(Fit(e, e->response.worst > EXACT ? 0 : HYCO_FIT_LEVELS - 1,
-                (HycoFitData){o.n, e->atoms.n, e->ny, 0, value, o.y, NULL, e->group, scale}, &e->base));
+  PetscCall(ExportFit(e, e->response.worst > EXACT ? 0 : HYCO_FIT_LEVELS - 1,
+                      (HycoFitData){o.n, e->atoms.n, e->ny, 0, value, o.y, NULL, e->group, scale}, &e->base));
   HycoFreeAll(&o.y, &o.added, &o.mu, &scale, &value);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The line of a refusal: what has no such functions, and the parameters without which it would. */
-static PetscErrorCode Refuse(Export *e)
+static PetscErrorCode ExportRefuse(Export *e)
 {
   const PetscBool response = (PetscBool)(e->response.worst > EXACT);
   const PetscInt row = (response ? e->response.worst_row : e->base.worst_row) % e->ny, at = row - e->p - e->k;
@@ -756,7 +763,7 @@ static PetscErrorCode Refuse(Export *e)
 /* -- the arrays -- */
 
 /* An atom in the program, which has its expression then. */
-static PetscErrorCode Take(Export *e, HycoAtom *a, int *place)
+static PetscErrorCode ExportAtom(Export *e, HycoAtom *a, int *place)
 {
   Model *o = &e->out.m;
   HycoCode *code = &e->out.code;
@@ -774,7 +781,7 @@ static PetscErrorCode Take(Export *e, HycoAtom *a, int *place)
 }
 
 /* The functions of both fits, each once; place[n]: where those of a fit are. */
-static PetscErrorCode Merge(Export *e, const HycoExportFit *fit, PetscInt place[])
+static PetscErrorCode ExportMerge(Export *e, const HycoExportFit *fit, PetscInt place[])
 {
   Model *o = &e->out.m;
 
@@ -784,7 +791,7 @@ static PetscErrorCode Merge(Export *e, const HycoExportFit *fit, PetscInt place[
     PetscInt at = 0;
 
     for (PetscInt j = 0; j < 4; j++) {
-      if (f.of[j] >= 0) PetscCall(Take(e, &e->atoms.atom[f.of[j]], &f.of[j]));
+      if (f.of[j] >= 0) PetscCall(ExportAtom(e, &e->atoms.atom[f.of[j]], &f.of[j]));
     }
     while (at < o->n_functions && memcmp(o->function + 4 * at, f.of, sizeof(f.of)) != 0) at++;
     if (at == o->n_functions) {
@@ -796,8 +803,8 @@ static PetscErrorCode Merge(Export *e, const HycoExportFit *fit, PetscInt place[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Two steps X = X (2 - M X) of a pseudo-inverse X, which has lost the digits of M's condition: functions of different outputs
-   may depend nearly on each other. */
+/* Two steps X = X (2 - M X) of a pseudo-inverse X, which has lost the digits of M's condition: functions of different
+   outputs may depend nearly on each other. */
 static PetscErrorCode RefineInverse(size_t n, const PetscReal M[], PetscReal X[])
 {
   PetscReal *MX, *old;
@@ -827,7 +834,7 @@ static PetscErrorCode ChoosePoints(Export *e, PetscReal point[], PetscReal inver
   PetscInt *pivot;
 
   PetscFunctionBegin;
-  PetscCall(Scatter(e, N, &mu));
+  PetscCall(ExportScatter(e, N, &mu));
   PetscCall(PetscMalloc4(n * N, &value, n * n, &chosen, n, &scale, N, &pivot));
   PetscCall(PetscArrayzero(scale, n));
   for (PetscInt i = 0; i < N; i++) {
@@ -888,11 +895,11 @@ static PetscErrorCode AddValues(Export *e, const PetscReal mu[], const PetscReal
   PetscCall(PetscCalloc3(all + 1, &z, e->ny, &y, e->ny, &y0));
   /* Results count friction where there is a normal force alone. */
   for (PetscInt c = 0; e->first && c < e->k; c++) z[e->p + c] = e->out.m.normal[c];
-  PetscCall(Probe(e, mu, z, y0));
+  PetscCall(ExportProbe(e, mu, z, y0));
   /* n probes at each point of the response: the values need no Jacobian of their own. */
   for (PetscInt c = 0; c < all && e->n_rows; c++) {
     z[c] += 1;
-    PetscCall(Probe(e, mu, z, y));
+    PetscCall(ExportProbe(e, mu, z, y));
     z[c] -= 1;
     for (PetscInt r = 0; r < e->n_rows; r++) {
       const PetscReal change = (y[n + r] - y0[n + r]) / UnitOf(e, c);
@@ -929,8 +936,8 @@ static PetscErrorCode DropRounding(Export *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rows of T that are more than round-off beside the others of their value, as terms: T is sparse in (value, function). By
-   unknown, as most have no force and are passed over. */
+/* The rows of T that are more than round-off beside the others of their value, as terms: T is sparse in (value,
+   function). By unknown, as most have no force and are passed over. */
 static PetscErrorCode KeepTerms(Export *e, const PetscInt place[], const PetscReal T[])
 {
   Model *o = &e->out.m;
@@ -990,7 +997,7 @@ static PetscErrorCode TakeTables(const HycoROM m, const HycoScene s, Model *o)
 }
 
 /* All arrays of the program from the functions. */
-static PetscErrorCode Fill(Export *e)
+static PetscErrorCode ExportFill(Export *e)
 {
   HycoExportModel *o = &e->out;
   const size_t k = (size_t)e->k, n = (size_t)(e->p + e->k), all = n + (size_t)e->l, f = (size_t)e->response.n;
@@ -1010,8 +1017,8 @@ static PetscErrorCode Fill(Export *e)
       (double)numbers, (double)MOST);
   PetscCall(PetscMalloc1(e->base.n + e->response.n + 1, &place));
   PetscCall(DropRounding(e));
-  PetscCall(Merge(e, &e->base, place));
-  PetscCall(Merge(e, &e->response, place + e->base.n));
+  PetscCall(ExportMerge(e, &e->base, place));
+  PetscCall(ExportMerge(e, &e->response, place + e->base.n));
   PetscCall(PetscCalloc1((size_t)e->ny * (size_t)o->m.n_functions + 1, &o->m.offset));
   for (PetscInt r = 0; r < e->ny; r++) {
     for (PetscInt j = 0; j < e->base.n; j++)
@@ -1048,7 +1055,8 @@ static PetscErrorCode Fill(Export *e)
 
 /* -- comparison with the model -- */
 
-/* The model's results in the order of the outputs, as above. *solved: its problem is; *loose: contact leaves a motion free. */
+/* The model's results in the order of the outputs, as above. *solved: its problem is; *loose: contact leaves a motion
+   free. */
 static PetscErrorCode RunModel(Export *e, const PetscReal mu[], PetscInt j, PetscReal out[], PetscBool *solved,
                                PetscBool *loose)
 {
@@ -1087,7 +1095,8 @@ static HycoDimension DimensionOf(const Export *e, PetscInt k)
   return at < dim ? HYCO_DIMENSION_FORCE : at == dim ? HYCO_DIMENSION_AREA : HYCO_DIMENSION_STRESS;
 }
 
-/* The size that errors of output k are relative to: the largest of its dimension, as one that vanishes by symmetry is round-off. */
+/* The size that errors of output k are relative to: the largest of its dimension, as one that vanishes by symmetry is
+   round-off. */
 static PetscReal ScaleOf(const Export *e, const PetscReal most[], PetscInt k)
 {
   const HycoDimension dimension = DimensionOf(e, k);
@@ -1101,9 +1110,9 @@ static PetscReal ScaleOf(const Export *e, const PetscReal most[], PetscInt k)
   return scale;
 }
 
-/* Sets e->out.difference: of an output relative to its largest value, at points over the ranges, of paths at their listed
-   times; fails if it is no round-off. And e->out.seconds, the processor time of the program. */
-static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
+/* Sets e->out.difference: of an output relative to its largest value, at points over the ranges, of paths at their
+   listed times; fails if it is no round-off. And e->out.seconds, the processor time of the program. */
+static PetscErrorCode ExportCompare(Export *e, const Model *model, void *memory)
 {
   const PetscInt n = e->out.m.n_outputs, times = PetscMax(e->s->n_times, 1);
   double kkt;
@@ -1179,8 +1188,8 @@ static void SetRanges(HycoScene s)
   }
 }
 
-/* What the stresses lose: of the values that are elastic ones. The unit of alpha: strains of it are of the size of those of loads
-   and forces; a support that moves a body as a whole gives none alone. */
+/* What the stresses lose: of the values that are elastic ones. The unit of alpha: strains of it are of the size of
+   those of loads and forces; a support that moves a body as a whole gives none alone. */
 static PetscErrorCode ScaleAlpha(Export *e)
 {
   PetscReal *mu, *z, *y, *more, size[2] = {0, 0};
@@ -1192,12 +1201,12 @@ static PetscErrorCode ScaleAlpha(Export *e)
     if (r->from == CELL) PetscCall(HycoFlowsLoseStress(e->flows, i, r->index, r->coefficient, &e->out));
     if (r->from == QUANTITY) PetscCall(HycoFlowsLoseQuantity(e->flows, i, r->index, &e->out));
   }
-  PetscCall(Scatter(e, 1, &mu));
+  PetscCall(ExportScatter(e, 1, &mu));
   PetscCall(PetscCalloc3(e->p + e->k + e->l, &z, e->ny, &y, e->ny, &more));
-  PetscCall(Probe(e, mu, z, y));
+  PetscCall(ExportProbe(e, mu, z, y));
   for (PetscInt part = 0; part < 2; part++) { /* forces, then alpha */
     for (PetscInt i = e->p; i < e->p + e->k + e->l; i++) z[i] = (i >= e->p + e->k) == part;
-    PetscCall(Probe(e, mu, z, more));
+    PetscCall(ExportProbe(e, mu, z, more));
     for (PetscInt i = e->p + e->k; i < e->ny; i++) {
       if (e->row[i - e->p - e->k].from != STRAIN) continue;
       size[part] = PetscMax(size[part], PetscAbsReal(more[i] - y[i]));
@@ -1211,7 +1220,7 @@ static PetscErrorCode ScaleAlpha(Export *e)
 }
 
 /* A prediction in the middle of the ranges comes first: the operations need a model that is set up. */
-static PetscErrorCode Prepare(Export *e)
+static PetscErrorCode ExportPrepare(Export *e)
 {
   const HycoROM m = e->m;
   PetscReal mu[HYCO_MAX_PARAMETERS], x[3 * PLACES];
@@ -1275,23 +1284,23 @@ static PetscErrorCode Prepare(Export *e)
 }
 
 /* Nothing is written before the comparison has passed. */
-static PetscErrorCode Build(Export *e)
+static PetscErrorCode ExportBuild(Export *e)
 {
   char *memory;
 
   PetscFunctionBegin;
-  PetscCall(Prepare(e));
+  PetscCall(ExportPrepare(e));
   PetscCall(FitBoth(e, -1, 1));
   /* A choice one by one misses functions that are nearly sums of others, as a small angle beside its sine. */
   if (PetscMax(e->base.worst, e->response.worst) > EXACT && PetscMax(e->base.worst, e->response.worst) < NEARLY)
     PetscCall(FitBoth(e, -1, MORE));
-  if (e->base.worst > EXACT || e->response.worst > EXACT) PetscCall(Refuse(e));
-  PetscCall(Fill(e));
+  if (e->base.worst > EXACT || e->response.worst > EXACT) PetscCall(ExportRefuse(e));
+  PetscCall(ExportFill(e));
   e->out.n_states = (PetscInt)state_size(&e->out.m);
   PetscCall(PetscMalloc1(e->out.n_states, &e->state));
   PetscCall(PetscMalloc1(work_size(&e->out.m) + 1, &memory));
   e->m->trace.rtol = NEWTON_RTOL;
-  HycoFinally(Compare(e, &e->out.m, memory), PetscCall(PetscFree(memory)); e->m->trace.rtol = 0);
+  HycoFinally(ExportCompare(e, &e->out.m, memory), PetscCall(PetscFree(memory)); e->m->trace.rtol = 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -1308,7 +1317,7 @@ static PetscErrorCode ExportC(HycoROM m, const char path[], char **description)
             path);
   PetscCall(HycoExportCheckFiles(path));
   point = HycoPointBegin(); /* C has a decimal point in any locale */
-  ierr = Build(&e);
+  ierr = ExportBuild(&e);
   if (!ierr) ierr = HycoExportWrite(&e.out, e.s, m->model->path, path, description);
   HycoPointEnd(point);
   PetscCall(HycoExportFitFree(&e.base));

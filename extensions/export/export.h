@@ -19,15 +19,16 @@ typedef struct {
   PetscInt n, room;
   PetscReal *text;
 } HycoCode;
-/* Adds an expression of the scene at the place x, minus (NULL: without) itself at another; x NULL: the place is given later.
-   *at: where it begins, -1: it is no expression of names that are known; *uses: it has a parameter; *space: x, y or z. */
+/* Adds an expression of the scene at the place x, minus (NULL: without) itself at another; x NULL: the place is given
+   later. *at: where it begins, -1: it is no expression of names that are known; *uses: it has a parameter; *space: x, y
+   or z. */
 PetscErrorCode HycoParse(HycoScene scene, const char text[], const PetscReal x[3], const PetscReal minus[3],
                          HycoCode *code, PetscInt *at, PetscBool *uses, PetscBool *space);
 /* The text of an entry with its body's temperature in place of the word; the caller frees it. */
 PetscErrorCode HycoExportHeat(HycoScene scene, const char key[], const char text[], char **hot);
 
-/* An expression of the scene in the parameters alone, at a fixed place, or what it changes from there to another (change).
-   Two weights of samples are never multiplied. */
+/* An expression of the scene in the parameters alone, at a fixed place, or what it changes from there to another
+   (change). Two weights of samples are never multiplied. */
 typedef struct {
   PetscInt code, n, place; /* where it begins, and its length; in the program, 1 and more */
   PetscBool change, weight;
@@ -46,8 +47,8 @@ typedef struct {
   int of[4];
 } HycoFunction;
 
-/* The atoms of a scene: its parameters, and each entry's expression that has one, at some places x (n x 3) if it varies in
-   space; of maps what they change from place to place, and unless `travels` also the places. */
+/* The atoms of a scene: its parameters, and each entry's expression that has one, at some places x (n x 3) if it varies
+   in space; of maps what they change from place to place, and unless `travels` also the places. */
 PetscErrorCode HycoAtomsFind(HycoScene scene, PetscBool travels, PetscInt n, const PetscReal x[], HycoAtoms *atoms);
 /* Adds the weight of a sample. */
 PetscErrorCode HycoAtomsAddWeight(HycoScene scene, const char text[], HycoAtoms *atoms);
@@ -70,9 +71,10 @@ typedef struct {
   PetscInt worst_row;
 } HycoExportFit;
 PetscErrorCode HycoExportFitFree(HycoExportFit *fit);
-/* The functions are those of a level: 1, a; from 1 on 1/c, a/c; from 2 on a b; from 3 on a b / c; from 4 on a b d. At level -1 they are those of
-   seed[], and their products with one atom; at level -2 - k with atom k. They are chosen one by one, which may miss some that depend nearly on others; or
-   (together) all, if they are few. worst > tol: they do not suffice, or are too many to be tried. The caller frees the fit. */
+/* The functions are those of a level: 1, a; from 1 on 1/c, a/c; from 2 on a b; from 3 on a b / c; from 4 on a b d. At
+   level -1 they are those of seed[], and their products with one atom; at level -2 - k with atom k. They are chosen one
+   by one, which may miss some that depend nearly on others; or (together) all, if they are few. worst > tol: they do
+   not suffice, or are too many to be tried. The caller frees the fit. */
 PetscErrorCode HycoFitFunctions(const HycoAtoms *atoms, PetscInt level, PetscBool together, PetscInt n_seeds,
                                 const HycoFunction seed[], PetscReal tol, const HycoFitData *data, HycoExportFit *fit);
 #define HYCO_FIT_LEVELS 5

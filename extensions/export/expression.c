@@ -14,13 +14,13 @@ typedef struct {
   PetscBool valid, uses, space;
 } Parser;
 
-static void Invalid(Parser *p)
+static void ExpressionInvalid(Parser *p)
 {
   p->valid = PETSC_FALSE;
 }
 
 /* An operation that takes some numbers from the stack and leaves one; up to PLACE with its number. */
-static void Write(Parser *p, int op, PetscInt takes, PetscReal number)
+static void ExpressionWrite(Parser *p, int op, PetscInt takes, PetscReal number)
 {
   HycoCode *c = p->code;
 
@@ -31,11 +31,11 @@ static void Write(Parser *p, int op, PetscInt takes, PetscReal number)
   c->text[c->n++] = op;
   if (op <= PLACE) c->text[c->n++] = number;
   p->stack += 1 - takes;
-  if (p->stack >= DEPTH) Invalid(p);
+  if (p->stack >= DEPTH) ExpressionInvalid(p);
 }
 
 /* Whether the next word is this one, which is skipped. */
-static PetscBool Take(Parser *p, const char word[])
+static PetscBool ExpressionAccept(Parser *p, const char word[])
 {
   while (isspace((unsigned char)*p->at)) p->at++;
   if (strncmp(p->at, word, strlen(word))) return PETSC_FALSE;
@@ -43,12 +43,12 @@ static PetscBool Take(Parser *p, const char word[])
   return PETSC_TRUE;
 }
 
-static void Expect(Parser *p, const char word[])
+static void ExpressionExpect(Parser *p, const char word[])
 {
-  if (!Take(p, word)) Invalid(p);
+  if (!ExpressionAccept(p, word)) ExpressionInvalid(p);
 }
 
-static void Ternary(Parser *p);
+static void ExpressionTernary(Parser *p);
 
 /* In the order of function_of[]. */
 static const char *const functions[] = {"sin",  "cos",   "tan",   "asin",  "acos",  "atan",  "sinh", "cosh",
@@ -64,43 +64,43 @@ static const struct {
                {"hypot", BINARY + HYPOT},
                {"mod", BINARY + MODULO}};
 
-static PetscBool Is(const char word[], const char name[], size_t n)
+static PetscBool ExpressionEquals(const char word[], const char name[], size_t n)
 {
   return (PetscBool)(strlen(word) == n && !strncmp(word, name, n));
 }
 
-static void Call(Parser *p, const char name[], size_t n)
+static void ExpressionCall(Parser *p, const char name[], size_t n)
 {
   int op = -1, of = -1;
 
   for (int k = 0; k < (int)(sizeof(several) / sizeof(several[0])); k++)
-    of = Is(several[k].name, name, n) ? several[k].op : of;
+    of = ExpressionEquals(several[k].name, name, n) ? several[k].op : of;
   for (int k = 0; k < (int)(sizeof(functions) / sizeof(functions[0])); k++)
-    op = Is(functions[k], name, n) ? UNARY + k : op;
-  Ternary(p);
-  while (of >= 0 && p->valid && Take(p, ",")) {
-    Ternary(p);
-    Write(p, of, 2, 0);
+    op = ExpressionEquals(functions[k], name, n) ? UNARY + k : op;
+  ExpressionTernary(p);
+  while (of >= 0 && p->valid && ExpressionAccept(p, ",")) {
+    ExpressionTernary(p);
+    ExpressionWrite(p, of, 2, 0);
   }
-  if (op >= 0) Write(p, op, 1, 0);
-  if (op < 0 && of < 0) Invalid(p);
-  Expect(p, ")");
+  if (op >= 0) ExpressionWrite(p, op, 1, 0);
+  if (op < 0 && of < 0) ExpressionInvalid(p);
+  ExpressionExpect(p, ")");
 }
 
 /* A constant of the scene: its text in its place. */
-static void Constant(Parser *p, const char text[])
+static void ExpressionConstant(Parser *p, const char text[])
 {
   const char *after = p->at;
 
   p->at = text;
-  Ternary(p);
-  (void)Take(p, "");
-  if (*p->at) Invalid(p);
+  ExpressionTernary(p);
+  (void)ExpressionAccept(p, "");
+  if (*p->at) ExpressionInvalid(p);
   p->at = after;
 }
 
 /* Parameters before constants before pi. Keys of constants are stored without regard to case. */
-static void Name(Parser *p)
+static void ExpressionName(Parser *p)
 {
   const HycoScene s = p->scene;
   const char *name = p->at;
@@ -108,13 +108,13 @@ static void Name(Parser *p)
 
   while (isalnum((unsigned char)name[n]) || name[n] == '_') n++;
   p->at += n;
-  if (Take(p, "(")) {
-    Call(p, name, n);
+  if (ExpressionAccept(p, "(")) {
+    ExpressionCall(p, name, n);
     return;
   }
   for (PetscInt k = 0; k < s->n_variables; k++) {
-    if (!Is(s->parameter[k], name, n)) continue;
-    Write(p, VARIABLE, 0, k);
+    if (!ExpressionEquals(s->parameter[k], name, n)) continue;
+    ExpressionWrite(p, VARIABLE, 0, k);
     p->uses = PETSC_TRUE;
     return;
   }
@@ -122,55 +122,55 @@ static void Name(Parser *p)
     const char *key = s->key[s->constant[k]] + strlen("constant_");
 
     if (strlen(key) != n || strncasecmp(key, name, n) != 0) continue;
-    Constant(p, s->value[s->constant[k]]);
+    ExpressionConstant(p, s->value[s->constant[k]]);
     return;
   }
-  if (Is("pi", name, n)) {
-    Write(p, NUMBER, 0, PETSC_PI);
+  if (ExpressionEquals("pi", name, n)) {
+    ExpressionWrite(p, NUMBER, 0, PETSC_PI);
   } else if (n == 1 && name[0] >= 'x' && name[0] <= 'z') {
     p->space = PETSC_TRUE;
-    Write(p, p->x ? NUMBER : PLACE, 0, p->x ? p->x[name[0] - 'x'] : name[0] - 'x');
+    ExpressionWrite(p, p->x ? NUMBER : PLACE, 0, p->x ? p->x[name[0] - 'x'] : name[0] - 'x');
   } else {
-    Invalid(p);
+    ExpressionInvalid(p);
   }
 }
 
 /* A name in itself would not end, like brackets without an end. */
-static void Primary(Parser *p)
+static void ExpressionPrimary(Parser *p)
 {
   PetscReal value;
   char *end;
 
-  if (++p->depth > 100) Invalid(p);
+  if (++p->depth > 100) ExpressionInvalid(p);
   if (!p->valid) return;
-  if (Take(p, "(")) {
-    Ternary(p);
-    Expect(p, ")");
+  if (ExpressionAccept(p, "(")) {
+    ExpressionTernary(p);
+    ExpressionExpect(p, ")");
   } else if (isalpha((unsigned char)*p->at) || *p->at == '_') {
-    Name(p);
+    ExpressionName(p);
   } else {
     value = strtod(p->at, &end);
-    if (end == p->at || !(isdigit((unsigned char)*p->at) || *p->at == '.')) Invalid(p);
+    if (end == p->at || !(isdigit((unsigned char)*p->at) || *p->at == '.')) ExpressionInvalid(p);
     p->at = end;
-    Write(p, NUMBER, 0, value);
+    ExpressionWrite(p, NUMBER, 0, value);
   }
   p->depth--;
 }
 
 /* a ^ b, from the right; a sign before it is of the power, one after ^ of the exponent. */
-static void Signed(Parser *p)
+static void ExpressionSigned(Parser *p)
 {
-  if (Take(p, "-")) {
-    Signed(p);
-    Write(p, NEGATE, 1, 0);
-  } else if (Take(p, "+")) {
-    Signed(p);
+  if (ExpressionAccept(p, "-")) {
+    ExpressionSigned(p);
+    ExpressionWrite(p, NEGATE, 1, 0);
+  } else if (ExpressionAccept(p, "+")) {
+    ExpressionSigned(p);
   } else {
-    Primary(p);
+    ExpressionPrimary(p);
     /* Powers associate from the right: the exponent is read by this function again. */
-    if (!p->valid || !Take(p, "^")) return;
-    Signed(p);
-    Write(p, POWER, 2, 0);
+    if (!p->valid || !ExpressionAccept(p, "^")) return;
+    ExpressionSigned(p);
+    ExpressionWrite(p, POWER, 2, 0);
   }
 }
 
@@ -185,29 +185,29 @@ static const struct {
                     {{"*", TIMES}, {"/", OVER}}};
 #define TIGHTEST 4
 
-static void Operand(Parser *p, int level)
+static void ExpressionOperand(Parser *p, int level)
 {
   if (level > TIGHTEST)
-    Signed(p);
+    ExpressionSigned(p);
   else {
-    Operand(p, level + 1);
+    ExpressionOperand(p, level + 1);
     for (int k = 0; p->valid && operators[level][k].name; k++) {
-      if (!Take(p, operators[level][k].name)) continue;
-      Operand(p, level + 1);
-      Write(p, BINARY + operators[level][k].op, 2, 0);
+      if (!ExpressionAccept(p, operators[level][k].name)) continue;
+      ExpressionOperand(p, level + 1);
+      ExpressionWrite(p, BINARY + operators[level][k].op, 2, 0);
       k = -1; /* further operators of this level follow, beginning with the longest name */
     }
   }
 }
 
-static void Ternary(Parser *p)
+static void ExpressionTernary(Parser *p)
 {
-  Operand(p, 0);
-  if (!p->valid || !Take(p, "?")) return;
-  Ternary(p);
-  Expect(p, ":");
-  Ternary(p);
-  Write(p, SELECT, 3, 0);
+  ExpressionOperand(p, 0);
+  if (!p->valid || !ExpressionAccept(p, "?")) return;
+  ExpressionTernary(p);
+  ExpressionExpect(p, ":");
+  ExpressionTernary(p);
+  ExpressionWrite(p, SELECT, 3, 0);
 }
 
 /* What invalid text has added stays, and is not used. */
@@ -221,12 +221,12 @@ PetscErrorCode HycoParse(HycoScene scene, const char text[], const PetscReal x[3
   for (PetscInt k = 0; k < (minus ? 2 : 1); k++) {
     p.at = text;
     p.x = k ? minus : x;
-    Ternary(&p);
-    (void)Take(&p, "");
-    if (*p.at) Invalid(&p);
+    ExpressionTernary(&p);
+    (void)ExpressionAccept(&p, "");
+    if (*p.at) ExpressionInvalid(&p);
   }
-  if (minus) Write(&p, BINARY + MINUS, 2, 0);
-  Write(&p, END, 0, 0);
+  if (minus) ExpressionWrite(&p, BINARY + MINUS, 2, 0);
+  ExpressionWrite(&p, END, 0, 0);
   if (!p.valid) *at = -1;
   if (uses) *uses = p.uses;
   if (space) *space = p.space;

@@ -1,6 +1,6 @@
 /*
-  Models whose bodies creep or yield. Strains of the points with laws are values of the program, linear in z, which then ends
-  with alpha; stresses of outputs are elastic ones without what the laws' points lose.
+  Models whose bodies creep or yield. Strains of the points with laws are values of the program, linear in z, which then
+  ends with alpha; stresses of outputs are elastic ones without what the laws' points lose.
 */
 #include "flow.h"
 #include <hycoflow.h>
@@ -206,8 +206,8 @@ PetscReal HycoFlowsStrain(HycoFlows f, PetscInt row)
   return sum;
 }
 
-static PetscErrorCode AddLost(HycoFlows f, PetscInt value, PetscInt i, PetscInt c, PetscReal share,
-                              HycoExportModel *out)
+static PetscErrorCode AddErrorNorm(HycoFlows f, PetscInt value, PetscInt i, PetscInt c, PetscReal share,
+                                   HycoExportModel *out)
 {
   Model *o = &out->m;
 
@@ -225,7 +225,7 @@ PetscErrorCode HycoFlowsLoseStress(HycoFlows f, PetscInt value, PetscInt cell, c
   PetscFunctionBegin;
   for (PetscInt i = f->n_settled; i < f->n_points; i++) {
     for (PetscInt c = 0; c < f->m->fe->n_sigma && f->point[i].cell == cell; c++)
-      PetscCall(AddLost(f, value, i, c, f->point[i].share * by[c], out));
+      PetscCall(AddErrorNorm(f, value, i, c, f->point[i].share * by[c], out));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -258,7 +258,7 @@ PetscErrorCode HycoFlowsLoseQuantity(HycoFlows f, PetscInt value, PetscInt k, Hy
       for (PetscInt d = 0; d < fe->n_dof; d++) push[d] = HycoFESupports(fe, d) ? push[d] : 0;
       sigma[p->cell * fe->n_sigma + c] = p->share;
       PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, fe, NULL, u, sigma, push, NULL, all));
-      PetscCall(AddLost(f, value, i, c, all[k], out));
+      PetscCall(AddErrorNorm(f, value, i, c, all[k], out));
       sigma[p->cell * fe->n_sigma + c] = 0;
     }
     PetscCall(PetscFree(B));

@@ -20,7 +20,8 @@ typedef struct {
   PetscInt n_modes, n_points, n_settled;
   FlowPoint *point;
 } * HycoFlows;
-/* After a prediction; *flows NULL: all bodies are elastic. Fails with what cannot be exported. Adds points and laws to out. */
+/* After a prediction; *flows NULL: all bodies are elastic. Fails with what cannot be exported. Adds points and laws to
+   out. */
 PetscErrorCode HycoFlowsCreate(HycoROM m, HycoExportModel *out, HycoFlows *flows);
 PetscErrorCode HycoFlowsDestroy(HycoFlows *flows);
 /* Component `row` of the points' strains at the last state. */

@@ -1,6 +1,6 @@
 /*
-  Data of a model as functions of the parameters: exact sums of products of the scene's expressions. Which products, a fit
-  at points over the ranges finds; a third of the points shows that it is exact.
+  Data of a model as functions of the parameters: exact sums of products of the scene's expressions. Which products, a
+  fit at points over the ranges finds; a third of the points shows that it is exact.
 */
 #include "export.h"
 #include <math.h>
@@ -14,7 +14,7 @@
 #define PASSES      3     /* of a solution by a pseudo-inverse */
 #define DEPENDENT   1e-10 /* share of an expression that is left beside a sum of others: round-off */
 
-static PetscReal Product(PetscInt n, const PetscReal a[], const PetscReal b[])
+static PetscReal FitProduct(PetscInt n, const PetscReal a[], const PetscReal b[])
 {
   PetscReal sum = 0;
 
@@ -23,9 +23,9 @@ static PetscReal Product(PetscInt n, const PetscReal a[], const PetscReal b[])
 }
 
 /* v -= its part along q, of length 1. */
-static void Deflate(PetscInt n, const PetscReal q[], PetscReal v[])
+static void FitDeflate(PetscInt n, const PetscReal q[], PetscReal v[])
 {
-  const PetscReal sum = Product(n, v, q);
+  const PetscReal sum = FitProduct(n, v, q);
 
   for (PetscInt i = 0; i < n; i++) v[i] -= sum * q[i];
 }
@@ -47,9 +47,9 @@ static PetscReal ValueOf(const HycoAtoms *atoms, const HycoAtom *a, const PetscR
   return value_of(atoms->code.text + a->code, mu, NULL);
 }
 
-/* Whether muParser has the same values at the ends and the middle of the ranges; axis as in Add(). */
-static PetscErrorCode Agrees(HycoScene s, const char key[], const char text[], const PetscReal x[], PetscInt axis,
-                             const PetscReal code[], PetscBool *agrees)
+/* Whether muParser has the same values at the ends and the middle of the ranges; axis as in FitAdd(). */
+static PetscErrorCode FitAgreesWithParser(HycoScene s, const char key[], const char text[], const PetscReal x[],
+                                          PetscInt axis, const PetscReal code[], PetscBool *agrees)
 {
   PetscReal mu[HYCO_MAX_PARAMETERS], mine, theirs, first = 0, to[3] = {x[0], x[1], x[2]};
   HycoExpr e;
@@ -75,8 +75,8 @@ static PetscErrorCode Agrees(HycoScene s, const char key[], const char text[], c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether an atom is a sum of the n others and, or of a constant (constant: whether that counts), by its values at irregular
-   points of the ranges: then its products are sums of theirs. */
+/* Whether an atom is a sum of the n others and, or of a constant (constant: whether that counts), by its values at
+   irregular points of the ranges: then its products are sums of theirs. */
 static PetscErrorCode IsSum(HycoScene s, const HycoAtoms *all, const HycoAtom *one, PetscBool constant, PetscInt n,
                             const HycoAtom atom[], PetscBool *is)
 {
@@ -98,9 +98,9 @@ static PetscErrorCode IsSum(HycoScene s, const HycoAtoms *all, const HycoAtom *o
       }
       v[i] = k ? ValueOf(all, k <= n ? &atom[k - 1] : one, mu) : 1;
     }
-    size = PetscSqrtReal(Product(N, v, v));
-    for (PetscInt j = 0; j < 2 * kept; j++) Deflate(N, q + j % kept * N, v); /* twice, against round-off */
-    left = PetscSqrtReal(Product(N, v, v));
+    size = PetscSqrtReal(FitProduct(N, v, v));
+    for (PetscInt j = 0; j < 2 * kept; j++) FitDeflate(N, q + j % kept * N, v); /* twice, against round-off */
+    left = PetscSqrtReal(FitProduct(N, v, v));
     *is = (PetscBool)(left <= DEPENDENT * size);
     for (PetscInt i = 0; i < N && !*is; i++) v[i] /= left;
     kept += !*is;
@@ -109,10 +109,10 @@ static PetscErrorCode IsSum(HycoScene s, const HycoAtoms *all, const HycoAtom *o
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* axis: of a change of the place by 1, as the entries of a turn by a map; -1: none. Atoms on which muParser and the parser
-   differ are left out silently, the fit then decides without them; so are constants, and multiples of others. */
-static PetscErrorCode Add(HycoScene s, const char key[], const char text[], const PetscReal x[3], PetscInt axis,
-                          PetscBool space, PetscBool weight, HycoAtoms *all)
+/* axis: of a change of the place by 1, as the entries of a turn by a map; -1: none. Atoms on which muParser and the
+   parser differ are left out silently, the fit then decides without them; so are constants, and multiples of others. */
+static PetscErrorCode FitAdd(HycoScene s, const char key[], const char text[], const PetscReal x[3], PetscInt axis,
+                             PetscBool space, PetscBool weight, HycoAtoms *all)
 {
   HycoAtom one = {.change = (PetscBool)(axis >= 0), .weight = weight};
   PetscReal to[3] = {x[0], x[1], x[2]};
@@ -123,7 +123,7 @@ static PetscErrorCode Add(HycoScene s, const char key[], const char text[], cons
   PetscCall(HycoParse(s, text, to, axis < 0 ? NULL : x, &all->code, &one.code, NULL, NULL));
   one.n = all->code.n - one.code;
   if (one.code < 0) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Agrees(s, key, text, x, axis, all->code.text + one.code, &agrees));
+  PetscCall(FitAgreesWithParser(s, key, text, x, axis, all->code.text + one.code, &agrees));
   for (PetscInt k = -1; k < all->n && agrees && !sum; k++)
     PetscCall(IsSum(s, all, &one, (PetscBool)(k < 0), k >= 0, all->atom + PetscMax(k, 0), &sum));
   /* At each place another sum, of a few functions: all of them would be too many candidates. */
@@ -139,7 +139,7 @@ PetscErrorCode HycoAtomsAddWeight(HycoScene s, const char text[], HycoAtoms *ato
   const PetscReal nowhere[3] = {0, 0, 0};
 
   PetscFunctionBegin;
-  PetscCall(Add(s, "weight of a sample", text, nowhere, -1, PETSC_FALSE, PETSC_TRUE, atoms));
+  PetscCall(FitAdd(s, "weight of a sample", text, nowhere, -1, PETSC_FALSE, PETSC_TRUE, atoms));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -154,9 +154,10 @@ static PetscErrorCode AddEntry(HycoScene s, const char key[], const char text[],
   PetscFunctionBegin;
   PetscCall(HycoParse(s, text, x, NULL, &atoms->code, &at, &uses, &space));
   if (at < 0 || !uses) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt c = 0; space && map && c < 3; c++) PetscCall(Add(s, key, text, x, c, PETSC_FALSE, PETSC_FALSE, atoms));
+  for (PetscInt c = 0; space && map && c < 3; c++)
+    PetscCall(FitAdd(s, key, text, x, c, PETSC_FALSE, PETSC_FALSE, atoms));
   for (PetscInt i = 0; !(map && travels) && i < (space ? n : 1); i++)
-    PetscCall(Add(s, key, text, x + 3 * i, -1, space, PETSC_FALSE, atoms));
+    PetscCall(FitAdd(s, key, text, x + 3 * i, -1, space, PETSC_FALSE, atoms));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -164,7 +165,7 @@ PetscErrorCode HycoAtomsFind(HycoScene s, PetscBool travels, PetscInt n, const P
 {
   PetscFunctionBegin;
   for (PetscInt p = 0; p < s->n_variables; p++)
-    PetscCall(Add(s, s->parameter[p], s->parameter[p], x, -1, PETSC_FALSE, PETSC_FALSE, atoms));
+    PetscCall(FitAdd(s, s->parameter[p], s->parameter[p], x, -1, PETSC_FALSE, PETSC_FALSE, atoms));
   for (PetscInt k = 0; k < s->n_entries; k++) {
     char *text;
 
@@ -203,8 +204,8 @@ PetscErrorCode HycoFunctionsEvaluate(HycoScene s, const HycoAtoms *atoms, PetscI
 }
 
 /* Adds a candidate a b d / c, unless a weight of a sample is a divisor, or two of the factors; f NULL: counts it. */
-static void Candidate(const HycoAtom atom[], PetscInt a, PetscInt b, PetscInt c, PetscInt d, PetscInt *n,
-                      HycoFunction f[])
+static void FitCandidate(const HycoAtom atom[], PetscInt a, PetscInt b, PetscInt c, PetscInt d, PetscInt *n,
+                         HycoFunction f[])
 {
   const HycoFunction one = {{(int)a, (int)b, (int)d, (int)c}};
   PetscInt weights = 0;
@@ -216,26 +217,26 @@ static void Candidate(const HycoAtom atom[], PetscInt a, PetscInt b, PetscInt c,
 }
 
 /* All candidates of a level, the simpler ones first; f NULL: counts them. */
-static PetscInt Candidates(PetscInt m, const HycoAtom atom[], PetscInt level, HycoFunction f[])
+static PetscInt FitCandidates(PetscInt m, const HycoAtom atom[], PetscInt level, HycoFunction f[])
 {
   PetscInt n = 0;
 
   /* The constant first: the choice prefers earlier candidates. */
-  for (PetscInt a = -1; a < m; a++) Candidate(atom, a, -1, -1, -1, &n, f);
-  for (PetscInt k = 0; level > 0 && k < (m + 1) * m; k++) Candidate(atom, k / m - 1, -1, k % m, -1, &n, f);
+  for (PetscInt a = -1; a < m; a++) FitCandidate(atom, a, -1, -1, -1, &n, f);
+  for (PetscInt k = 0; level > 0 && k < (m + 1) * m; k++) FitCandidate(atom, k / m - 1, -1, k % m, -1, &n, f);
   for (PetscInt c = -1; level > 1 && c < (level > 2 ? m : 0); c++) {
     for (PetscInt k = 0; k < m * m; k++) {
-      if (k / m <= k % m) Candidate(atom, k / m, k % m, c, -1, &n, f);
+      if (k / m <= k % m) FitCandidate(atom, k / m, k % m, c, -1, &n, f);
     }
   }
   for (PetscInt k = 0; level > 3 && k < m * m * m; k++) {
-    if (k / m / m <= k / m % m && k / m % m <= k % m) Candidate(atom, k / m / m, k / m % m, -1, k % m, &n, f);
+    if (k / m / m <= k / m % m && k / m % m <= k % m) FitCandidate(atom, k / m / m, k / m % m, -1, k % m, &n, f);
   }
   return n;
 }
 
-/* The same from functions that are known to matter: these, and their products with one atom that is neither a weight nor a
-   turn, `only` this (-1: any). */
+/* The same from functions that are known to matter: these, and their products with one atom that is neither a weight
+   nor a turn, `only` this (-1: any). */
 static PetscInt FromSeeds(PetscInt m, const HycoAtom atom[], PetscInt only, PetscInt n_seeds, const HycoFunction seed[],
                           HycoFunction f[])
 {
@@ -260,13 +261,13 @@ static PetscInt FromSeeds(PetscInt m, const HycoAtom atom[], PetscInt only, Pets
 /* -- the fit -- */
 
 /* Whether a point is one of those that check the fit. */
-static PetscBool Held(PetscInt k)
+static PetscBool FitIsCheckPoint(PetscInt k)
 {
   return (PetscBool)(k % 3 == 2);
 }
 
 /* Value r of the fit's rows at point i; the scale of its errors. */
-static PetscReal Y(const HycoFitData *d, PetscInt i, PetscInt r)
+static PetscReal FitValue(const HycoFitData *d, PetscInt i, PetscInt r)
 {
   return d->y[(size_t)i * (size_t)d->stride + (size_t)d->row[r]];
 }
@@ -277,7 +278,7 @@ static PetscReal ScaleOf(const HycoFitData *d, PetscInt r)
 }
 
 /* values[k * N + i] of the functions at all N points, without those that are 0 or not finite somewhere. */
-static void Tabulate(const HycoFitData *d, PetscInt *n, HycoFunction f[], PetscReal value[])
+static void FitTabulate(const HycoFitData *d, PetscInt *n, HycoFunction f[], PetscReal value[])
 {
   PetscInt kept = 0;
 
@@ -295,18 +296,18 @@ static void Tabulate(const HycoFitData *d, PetscInt *n, HycoFunction f[], PetscR
 }
 
 /* Combinations of the rows at the fitted points, in units of their groups: target[MIXED * N], other points 0. */
-static void Mix(const HycoFitData *d, PetscReal target[])
+static void FitCombineRows(const HycoFitData *d, PetscReal target[])
 {
   for (PetscInt i = 0; i < MIXED * d->n_points; i++) target[i] = 0;
   for (PetscInt i = 0; i < d->n_points; i++) {
-    for (PetscInt r = 0; r < d->n_rows && !Held(i); r++) {
+    for (PetscInt r = 0; r < d->n_rows && !FitIsCheckPoint(i); r++) {
       if (ScaleOf(d, r) == 0) continue;
       for (PetscInt c = 0; c < MIXED; c++) {
         /* Irregular weights: no row cancels in all combinations. The cost of a choice is then that of MIXED rows,
            not of all. */
         const PetscReal share = (r + 1) * (0.61803398874989485 + 0.075 * c);
 
-        target[c * d->n_points + i] += (share - PetscFloorReal(share) - 0.5) * Y(d, i, r) / ScaleOf(d, r);
+        target[c * d->n_points + i] += (share - PetscFloorReal(share) - 0.5) * FitValue(d, i, r) / ScaleOf(d, r);
       }
     }
   }
@@ -314,20 +315,20 @@ static void Mix(const HycoFitData *d, PetscReal target[])
 
 /* What the targets lose by a function that is orthogonal to the chosen ones, relative to its square; 0: it depends on
    them. */
-static PetscReal Gain(PetscInt N, const PetscReal v[], PetscReal size, const PetscReal target[])
+static PetscReal FitGain(PetscInt N, const PetscReal v[], PetscReal size, const PetscReal target[])
 {
-  const PetscReal left = Product(N, v, v);
+  const PetscReal left = FitProduct(N, v, v);
   PetscReal gain = 0;
 
   /* A function that depends on the chosen ones would fit round-off with large coefficients. */
   if (!(left > PetscSqr(INDEPENDENT) * size) || PetscIsInfOrNanReal(left)) return 0;
-  for (PetscInt c = 0; c < MIXED; c++) gain += PetscSqr(Product(N, v, target + c * N));
+  for (PetscInt c = 0; c < MIXED; c++) gain += PetscSqr(FitProduct(N, v, target + c * N));
   return gain / left;
 }
 
-/* Orthogonal matching pursuit: the n candidates by which the targets are lost, one after the other, to round-off; the simpler
-   ones first where they do as much. */
-static PetscErrorCode Choose(const HycoFitData *d, PetscInt *n, HycoFunction f[], PetscReal value[])
+/* Orthogonal matching pursuit: the n candidates by which the targets are lost, one after the other, to round-off; the
+   simpler ones first where they do as much. */
+static PetscErrorCode FitChoose(const HycoFitData *d, PetscInt *n, HycoFunction f[], PetscReal value[])
 {
   const PetscInt N = d->n_points, most = PetscMin(*n, PetscMin(MOST, N / 3));
   PetscReal *v, *target, *size, *q, all;
@@ -335,19 +336,19 @@ static PetscErrorCode Choose(const HycoFitData *d, PetscInt *n, HycoFunction f[]
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc5((size_t)*n * (size_t)N, &v, MIXED * N, &target, *n, &size, N, &q, most + 1, &chosen));
-  Mix(d, target);
-  all = Product(MIXED * N, target, target);
+  FitCombineRows(d, target);
+  all = FitProduct(MIXED * N, target, target);
   PetscCall(PetscArraycpy(v, value, (size_t)*n * (size_t)N));
   for (PetscInt k = 0; k < *n; k++) {
     for (PetscInt i = 2; i < N; i += 3) v[(size_t)k * (size_t)N + (size_t)i] = 0; /* not fitted */
-    size[k] = Product(N, v + (size_t)k * (size_t)N, v + (size_t)k * (size_t)N);
+    size[k] = FitProduct(N, v + (size_t)k * (size_t)N, v + (size_t)k * (size_t)N);
   }
-  while (m < most && Product(MIXED * N, target, target) > 1e-28 * all) {
+  while (m < most && FitProduct(MIXED * N, target, target) > 1e-28 * all) {
     PetscReal best = 0;
 
     chosen[m] = -1;
     for (PetscInt k = 0; k < *n; k++) {
-      const PetscReal gain = Gain(N, v + (size_t)k * (size_t)N, size[k], target);
+      const PetscReal gain = FitGain(N, v + (size_t)k * (size_t)N, size[k], target);
 
       /* Not for a difference of round-off: the simpler one comes first. */
       if (gain <= (1 + 1e-9) * best) continue;
@@ -356,11 +357,11 @@ static PetscErrorCode Choose(const HycoFitData *d, PetscInt *n, HycoFunction f[]
     }
     if (chosen[m] < 0) break;
     PetscCall(PetscArraycpy(q, v + (size_t)chosen[m] * (size_t)N, N));
-    best = PetscSqrtReal(Product(N, q, q));
+    best = PetscSqrtReal(FitProduct(N, q, q));
     for (PetscInt i = 0; i < N; i++) q[i] /= best;
     /* Gram-Schmidt for all candidates at once. */
-    for (PetscInt k = 0; k < *n; k++) Deflate(N, q, v + (size_t)k * (size_t)N);
-    for (PetscInt c = 0; c < MIXED; c++) Deflate(N, q, target + c * N);
+    for (PetscInt k = 0; k < *n; k++) FitDeflate(N, q, v + (size_t)k * (size_t)N);
+    for (PetscInt c = 0; c < MIXED; c++) FitDeflate(N, q, target + c * N);
     m++;
   }
   if (!m) chosen[m++] = 0; /* all is 0 */
@@ -375,7 +376,7 @@ static PetscErrorCode Choose(const HycoFitData *d, PetscInt *n, HycoFunction f[]
 }
 
 /* Least squares at the fitted points: the coefficients and sizes of fit's functions, and the error at the others. */
-static PetscErrorCode Solve(const HycoFitData *d, const PetscReal value[], HycoExportFit *fit)
+static PetscErrorCode FitSolve(const HycoFitData *d, const PetscReal value[], HycoExportFit *fit)
 {
   const PetscInt N = d->n_points, n = fit->n;
   PetscReal *A, *P, *left;
@@ -387,7 +388,7 @@ static PetscErrorCode Solve(const HycoFitData *d, const PetscReal value[], HycoE
   PetscCall(PetscCalloc1(n + 1, &fit->size));
   PetscCall(PetscMalloc4((size_t)n * (size_t)N, &A, (size_t)n * (size_t)N, &P, N, &left, N, &at));
   for (PetscInt i = 0; i < N; i++) {
-    if (!Held(i)) at[m++] = i;
+    if (!FitIsCheckPoint(i)) at[m++] = i;
   }
   for (PetscInt k = 0; k < n; k++) {
     const PetscReal *v = value + (size_t)k * (size_t)N;
@@ -405,7 +406,7 @@ static PetscErrorCode Solve(const HycoFitData *d, const PetscReal value[], HycoE
     /* Refined: a product with a pseudo-inverse loses the digits of its condition. */
     for (PetscInt pass = 0; pass < PASSES; pass++) {
       for (PetscInt i = 0; i < m; i++) {
-        left[i] = Y(d, at[i], r);
+        left[i] = FitValue(d, at[i], r);
         for (PetscInt k = 0; k < n; k++) left[i] -= c[(size_t)k * next] * A[k * m + i];
       }
       for (PetscInt i = 0; i < m; i++) {
@@ -413,8 +414,8 @@ static PetscErrorCode Solve(const HycoFitData *d, const PetscReal value[], HycoE
       }
     }
     for (PetscInt k = 0; k < n; k++) c[(size_t)k * next] /= fit->size[k];
-    for (PetscInt i = 2; i < N; i += 3) { /* Held() */
-      PetscReal error = -Y(d, i, r);
+    for (PetscInt i = 2; i < N; i += 3) { /* FitIsCheckPoint() */
+      PetscReal error = -FitValue(d, i, r);
 
       for (PetscInt k = 0; k < n; k++) error += c[(size_t)k * next] * value[(size_t)k * (size_t)N + (size_t)i];
       /* Also where the scale is 0 and the error, too; otherwise the division gives infinity, which is refused. */
@@ -435,9 +436,9 @@ PetscErrorCode HycoExportFitFree(HycoExportFit *fit)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Leaves out the functions whose part of each row is below a share of the row's group, round-off, as long as the fit is as
-   good. */
-static PetscErrorCode Reduce(const HycoFitData *d, PetscReal tol, const PetscReal value[], HycoExportFit *fit)
+/* Leaves out the functions whose part of each row is below a share of the row's group, round-off, as long as the fit is
+   as good. */
+static PetscErrorCode FitReduce(const HycoFitData *d, PetscReal tol, const PetscReal value[], HycoExportFit *fit)
 {
   PetscReal *less;
   HycoExportFit part = {0};
@@ -460,7 +461,7 @@ static PetscErrorCode Reduce(const HycoFitData *d, PetscReal tol, const PetscRea
                               d->n_points));
       part.function[part.n++] = fit->function[k];
     }
-    if (part.n) PetscCall(Solve(d, less, &part));
+    if (part.n) PetscCall(FitSolve(d, less, &part));
     if (!part.n || part.worst > tol) continue;
     PetscCall(HycoExportFitFree(fit));
     *fit = part;
@@ -477,8 +478,8 @@ PetscErrorCode HycoFitFunctions(const HycoAtoms *atoms, PetscInt level, PetscBoo
                                 const HycoFunction seed[], PetscReal tol, const HycoFitData *d, HycoExportFit *fit)
 {
   const HycoAtom *atom = atoms->atom;
-  const PetscInt most =
-      level < 0 ? FromSeeds(atoms->n, atom, -2 - level, n_seeds, seed, NULL) : Candidates(atoms->n, atom, level, NULL);
+  const PetscInt most = level < 0 ? FromSeeds(atoms->n, atom, -2 - level, n_seeds, seed, NULL)
+                                  : FitCandidates(atoms->n, atom, level, NULL);
   PetscReal *value;
 
   PetscFunctionBegin;
@@ -491,12 +492,12 @@ PetscErrorCode HycoFitFunctions(const HycoAtoms *atoms, PetscInt level, PetscBoo
   if (level < 0)
     (void)FromSeeds(atoms->n, atom, -2 - level, n_seeds, seed, fit->function);
   else
-    (void)Candidates(atoms->n, atom, level, fit->function);
-  Tabulate(d, &fit->n, fit->function, value);
+    (void)FitCandidates(atoms->n, atom, level, fit->function);
+  FitTabulate(d, &fit->n, fit->function, value);
   if (together && fit->n > d->n_points / 2) fit->n = 0;
-  if (!together) PetscCall(Choose(d, &fit->n, fit->function, value));
-  if (fit->n) PetscCall(Solve(d, value, fit));
-  if (fit->worst <= tol) PetscCall(Reduce(d, tol, value, fit));
+  if (!together) PetscCall(FitChoose(d, &fit->n, fit->function, value));
+  if (fit->n) PetscCall(FitSolve(d, value, fit));
+  if (fit->worst <= tol) PetscCall(FitReduce(d, tol, value, fit));
   PetscCall(PetscFree(value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

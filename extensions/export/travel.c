@@ -18,7 +18,7 @@ PetscErrorCode HycoTravelDestroy(HycoTravel *travel)
 #define ADD_VALUE(t, ...) HYCO_APPEND((t)->n_values, (t)->value, (TravelValue){__VA_ARGS__})
 
 /* Moves the model. */
-static PetscErrorCode Bring(HycoTravel t, const PetscReal mu[])
+static PetscErrorCode MovedSurfaceUpdate(HycoTravel t, const PetscReal mu[])
 {
   const HycoBodiesSurface s = HycoBodiesSurfaceOf(t->m);
   const PetscInt n = t->m->model->scene->n_parameters;
@@ -37,7 +37,7 @@ static PetscErrorCode Bring(HycoTravel t, const PetscReal mu[])
 
 /* -- what cannot be exported -- */
 
-static PetscErrorCode Check(HycoROM m)
+static PetscErrorCode MovedSurfaceCheck(HycoROM m)
 {
   const HycoFE fe = m->fe;
   const HycoScene s = m->model->scene;
@@ -271,8 +271,8 @@ static PetscErrorCode FindSurfaces(HycoTravel t, const PetscInt number[], HycoEx
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The places of the nodes' unknowns; those that supports prescribe somewhere in the ranges, and the bodies that turn, have
-   values. turns: by body. */
+/* The places of the nodes' unknowns; those that supports prescribe somewhere in the ranges, and the bodies that turn,
+   have values. turns: by body. */
 static PetscErrorCode FindPlaces(HycoTravel t, const PetscBool moves[], const PetscBool turns[], HycoExportModel *out)
 {
   const HycoSubstructures b = t->bodies->bodies;
@@ -324,7 +324,7 @@ static PetscErrorCode FindMotions(HycoTravel t, PetscBool moves[], PetscBool tur
   PetscCall(HycoSamplesAddScattered(samples, POINTS));
   PetscCall(HycoSamplesGet(samples, &n, NULL, &mu));
   for (PetscInt i = 0; i < n && !ierr; i++) {
-    ierr = Bring(t, mu + i * t->m->model->scene->n_parameters);
+    ierr = MovedSurfaceUpdate(t, mu + i * t->m->model->scene->n_parameters);
     for (PetscInt k = 0; k < fe->n_dof && !ierr; k++)
       moves[k] = (PetscBool)(moves[k] || (fe->fixed[k] && fe->u0[k] != 0));
     for (PetscInt k = 0; k < 9 * t->bodies->bodies->n && !ierr; k++)
@@ -336,13 +336,13 @@ static PetscErrorCode FindMotions(HycoTravel t, PetscBool moves[], PetscBool tur
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Make(HycoTravel t, HycoExportModel *out)
+static PetscErrorCode MovedSurfaceMake(HycoTravel t, HycoExportModel *out)
 {
   PetscInt *number;
   PetscBool *moves, *turns;
 
   PetscFunctionBegin;
-  PetscCall(Check(t->m));
+  PetscCall(MovedSurfaceCheck(t->m));
   t->bodies = (HycoBodiesWork)t->m->work;
   PetscCall(TakeElement(t->m->fe, &out->m.surfaces));
   PetscCall(PetscMalloc1(t->m->fe->mesh->n_nodes, &number));
@@ -357,7 +357,7 @@ static PetscErrorCode Make(HycoTravel t, HycoExportModel *out)
 }
 
 /* Whether parameters move a surface whose masters are searched for: a map without any only places it. */
-static PetscErrorCode Travels(HycoROM m, PetscBool *travels)
+static PetscErrorCode MovedSurfaceIsMoving(HycoROM m, PetscBool *travels)
 {
   const HycoScene s = m->model->scene;
   const HycoMesh mesh = m->fe->mesh;
@@ -387,12 +387,12 @@ PetscErrorCode HycoTravelCreate(HycoROM m, HycoExportModel *out, HycoTravel *tra
 
   PetscFunctionBegin;
   *travel = NULL;
-  PetscCall(Travels(m, &travels));
+  PetscCall(MovedSurfaceIsMoving(m, &travels));
   if (!travels) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&t));
   t->m = m;
   *travel = t;
-  PetscCall(Make(t, out));
+  PetscCall(MovedSurfaceMake(t, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -412,7 +412,7 @@ PetscErrorCode HycoTravelResidual(HycoTravel t, const PetscReal mu[], const Pets
   const HycoSubstructures b = o->bodies;
 
   PetscFunctionBegin;
-  PetscCall(Bring(t, mu));
+  PetscCall(MovedSurfaceUpdate(t, mu));
   PetscCall(PetscArrayzero(t->m->Lambda, t->m->model->pairs.n));
   PetscCall(PetscArraycpy(o->x, z, b->p));
   PetscCall(HycoBodiesRespond(o, z + b->p));
@@ -424,7 +424,7 @@ PetscErrorCode HycoTravelResidual(HycoTravel t, const PetscReal mu[], const Pets
 PetscErrorCode HycoTravelMotions(HycoTravel t, const PetscReal mu[], PetscReal Z[])
 {
   PetscFunctionBegin;
-  PetscCall(Bring(t, mu));
+  PetscCall(MovedSurfaceUpdate(t, mu));
   PetscCall(PetscArraycpy(Z, t->bodies->Z, t->bodies->bodies->ns * t->bodies->bodies->p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

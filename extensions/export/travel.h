@@ -7,8 +7,9 @@
 #include "export.h"
 
 /* The problem of a model of bodies before its contacts: z are the rigid motions (p) and the forces at the places of the
-   surfaces, w the loads' work on the motions and the displacements of the places, with the opposite sign. Beside it values
-   that are functions of the parameters: the flexibility of each body over its first one, prescribed displacements, turns. */
+   surfaces, w the loads' work on the motions and the displacements of the places, with the opposite sign. Beside it
+   values that are functions of the parameters: the flexibility of each body over its first one, prescribed
+   displacements, turns. */
 typedef enum { FLEXIBLE, HELD, TURN } TravelFrom;
 typedef struct {
   TravelFrom from;
@@ -22,12 +23,13 @@ typedef struct {
   PetscReal mu[HYCO_MAX_PARAMETERS];
   PetscBool placed; /* the model is at mu */
 } * HycoTravel;
-/* After a prediction. *travel NULL: no surface of the model moves. Fails with what cannot be exported. Adds the surfaces to
-   out, which owns them. */
+/* After a prediction. *travel NULL: no surface of the model moves. Fails with what cannot be exported. Adds the
+   surfaces to out, which owns them. */
 PetscErrorCode HycoTravelCreate(HycoROM m, HycoExportModel *out, HycoTravel *travel);
 PetscErrorCode HycoTravelDestroy(HycoTravel *travel);
-/* The weights of the samples of a model of bodies, between which those that change their shape or the ratio of their moduli
-   are interpolated, as expressions in the scene's parameters; each once. The caller frees the texts and the array. */
+/* The weights of the samples of a model of bodies, between which those that change their shape or the ratio of their
+   moduli are interpolated, as expressions in the scene's parameters; each once. The caller frees the texts and the
+   array. */
 PetscErrorCode HycoExportWeights(HycoROM m, PetscInt *n, char ***text);
 /* z at the last prediction. */
 void HycoTravelUnknowns(HycoTravel travel, PetscReal z[]);

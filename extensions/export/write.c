@@ -7,7 +7,8 @@
 #include <stdio.h>
 #include <string.h>
 
-/* By extension.cmake: what the library and a program share, and the parts of both files that are alike but for the prefix. */
+/* By extension.cmake: what the library and a program share, and the parts of both files that are alike but for the
+   prefix. */
 extern const char HycoExport_runtime[], HycoExport_header_h[], HycoExport_predict_h[], HycoExport_step_h[],
     HycoExport_flow[], HycoExport_calls_c[], HycoExport_predict_c[], HycoExport_step_c[];
 
@@ -115,8 +116,8 @@ static PetscErrorCode WriteHeader(const HycoExportModel *m, HycoScene s, const c
 
 /* -- the program -- */
 
-/* An array: type and member of the model, or a name seen from outside if this begins with a '_'; n items of `width` numbers
-   each, 0: they are numbers; own: the address of its pointer. */
+/* An array: type and member of the model, or a name seen from outside if this begins with a '_'; n items of `width`
+   numbers each, 0: they are numbers; own: the address of its pointer. */
 typedef struct {
   const char *type, *name;
   size_t n, width;
@@ -127,7 +128,7 @@ typedef struct {
 #define MOST_ARRAYS 56
 #define OWN(array)  (array), &(array)
 
-static int List(HycoExportModel *e, HycoScene s, Array list[MOST_ARRAYS])
+static int ProgramList(HycoExportModel *e, HycoScene s, Array list[MOST_ARRAYS])
 {
   Model *m = &e->m;
   Surfaces *f = &m->surfaces;
@@ -199,7 +200,7 @@ PetscErrorCode HycoExportModelFree(HycoExportModel *e, HycoScene s)
 
   PetscFunctionBegin;
   e->m.code = e->code.text; /* after an error too */
-  n = List(e, s, list);
+  n = ProgramList(e, s, list);
   for (PetscInt k = 0; k < e->m.n_outputs; k++) HycoFreeAll(&e->name[k], &e->unit[k]);
   HycoFreeAll(&e->name, &e->unit);
   for (int k = 0; k < n; k++) {
@@ -259,7 +260,7 @@ static PetscErrorCode WriteProgram(HycoExportModel *e, HycoScene s, const char p
 {
   const Model *m = &e->m;
   Array list[MOST_ARRAYS];
-  const int n = List(e, s, list);
+  const int n = ProgramList(e, s, list);
   const struct {
     const char *name;
     int value;
@@ -299,8 +300,8 @@ static PetscErrorCode WriteProgram(HycoExportModel *e, HycoScene s, const char p
 
 /* -- the files -- */
 
-static PetscErrorCode Describe(const HycoExportModel *m, HycoScene s, const char path[], const char header[],
-                               const char prefix[], size_t bytes, HycoText *t)
+static PetscErrorCode ProgramDescribe(const HycoExportModel *m, HycoScene s, const char path[], const char header[],
+                                      const char prefix[], size_t bytes, HycoText *t)
 {
   PetscFunctionBegin;
   ADD(t, "%s, %s: %s_%s(), %.3g MB; %d %s, %d motions that contact holds, %d functions of the parameters\n", path,
@@ -318,7 +319,7 @@ static PetscErrorCode Describe(const HycoExportModel *m, HycoScene s, const char
 }
 
 /* By a temporary file: an existing program stays complete if the disk is full. */
-static PetscErrorCode Put(const char path[], const HycoText *t)
+static PetscErrorCode ProgramInsert(const char path[], const HycoText *t)
 {
   HycoFile file;
 
@@ -376,9 +377,9 @@ PetscErrorCode HycoExportWrite(HycoExportModel *m, HycoScene s, const char name[
   PrefixOf(name, prefix);
   ierr = WriteHeader(m, s, prefix, &header);
   if (!ierr) ierr = WriteProgram(m, s, prefix, file, &program);
-  if (!ierr) ierr = Put(beside, &header);
-  if (!ierr) ierr = Put(path, &program);
-  if (!ierr) ierr = Describe(m, s, path, beside, prefix, program.n, &words);
+  if (!ierr) ierr = ProgramInsert(beside, &header);
+  if (!ierr) ierr = ProgramInsert(path, &program);
+  if (!ierr) ierr = ProgramDescribe(m, s, path, beside, prefix, program.n, &words);
   HycoFreeAll(&header.text, &program.text);
   *description = words.text;
   PetscCall(ierr);

@@ -55,20 +55,20 @@ static const int deadly[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
 #define N_DEADLY ((int)(sizeof(deadly) / sizeof(deadly[0])))
 static sigjmp_buf alive;
 
-/* Back to Open(): a static initialiser of the library has crashed. */
-static void Escape(int signal)
+/* Back to MfrontOpen(): a static initialiser of the library has crashed. */
+static void MfrontEscape(int signal)
 {
   siglongjmp(alive, signal);
 }
 
 /* dlopen(); *died: the signal by which it ended, or 0. */
-static void *Open(const char path[], int *died)
+static void *MfrontOpen(const char path[], int *died)
 {
   struct sigaction mine, before[N_DEADLY];
   void *volatile library = NULL;
 
   memset(&mine, 0, sizeof(mine));
-  mine.sa_handler = Escape;
+  mine.sa_handler = MfrontEscape;
   sigemptyset(&mine.sa_mask);
   for (int k = 0; k < N_DEADLY; k++) sigaction(deadly[k], &mine, &before[k]);
   *died = sigsetjmp(alive, 1);
@@ -85,7 +85,7 @@ static const char *BodyName(HycoMaterial law)
 
 /* Loads the library. A name with a slash is a path relative to the scene's folder, or else to the working folder;
    one without a slash is searched in the scene's folder, and else in the system's library path. */
-static PetscErrorCode Load(HycoMaterial law, const char name[], MFront *m)
+static PetscErrorCode MfrontLoad(HycoMaterial law, const char name[], MFront *m)
 {
   char path[HYCO_LINE];
   const char *why;
@@ -95,7 +95,7 @@ static PetscErrorCode Load(HycoMaterial law, const char name[], MFront *m)
   HycoFormat(path, "%s/%s", law->folder ? law->folder : ".", name);
   if (name[0] == '/' || access(path, F_OK)) HycoFormat(path, "%s", name);
   (void)dlerror();
-  m->library = Open(path, &died);
+  m->library = MfrontOpen(path, &died);
   why = died ? NULL : dlerror();
   HycoCheck(!died, "body %s: the library %s crashes when it is loaded (signal %d)", BodyName(law), path, died);
   HycoCheck(m->library, "body %s: the library %s cannot be loaded: %s", BodyName(law), path,
@@ -104,7 +104,7 @@ static PetscErrorCode Load(HycoMaterial law, const char name[], MFront *m)
 }
 
 /* The symbol BEHAVIOUR_HYPOTHESIS_what, or BEHAVIOUR_what; hypothesis NULL: the latter alone. NULL: there is none. */
-static const void *Find(const MFront *m, const char hypothesis[], const char what[])
+static const void *MfrontFind(const MFront *m, const char hypothesis[], const char what[])
 {
   char symbol[HYCO_LINE];
   const void *found = NULL;
@@ -121,26 +121,26 @@ static const void *Find(const MFront *m, const char hypothesis[], const char wha
 }
 
 /* Symbols of numbers are unsigned short in the interface. */
-static unsigned Number(const MFront *m, const char hypothesis[], const char what[], unsigned absent)
+static unsigned MfrontReadNumber(const MFront *m, const char hypothesis[], const char what[], unsigned absent)
 {
-  const unsigned short *value = (const unsigned short *)Find(m, hypothesis, what);
+  const unsigned short *value = (const unsigned short *)MfrontFind(m, hypothesis, what);
 
   return value ? *value : absent;
 }
 
 /* Reads a list of names; their number is the symbol of the same name preceded by n. */
-static PetscErrorCode List(HycoMaterial law, const MFront *m, const char hypothesis[], const char what[], PetscInt *n,
-                           const char *const **names)
+static PetscErrorCode MfrontList(HycoMaterial law, const MFront *m, const char hypothesis[], const char what[],
+                                 PetscInt *n, const char *const **names)
 {
   char count[HYCO_LINE];
 
   PetscFunctionBegin;
   HycoFormat(count, "n%s", what);
-  HycoCheck(Find(m, hypothesis, count),
+  HycoCheck(MfrontFind(m, hypothesis, count),
             "body %s: the library has no symbol %s_%s; check that %s is a behaviour of MFront's generic interface",
             BodyName(law), m->behaviour, count, m->behaviour);
-  *n = (PetscInt)Number(m, hypothesis, count, 0);
-  *names = (const char *const *)Find(m, hypothesis, what);
+  *n = (PetscInt)MfrontReadNumber(m, hypothesis, count, 0);
+  *names = (const char *const *)MfrontFind(m, hypothesis, what);
   HycoCheck(!*n || *names, "body %s: the library has no symbol %s_%s", BodyName(law), m->behaviour, what);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -148,28 +148,29 @@ static PetscErrorCode List(HycoMaterial law, const MFront *m, const char hypothe
 /* Checks that the behaviour is of a kind that the finite elements can use. */
 static PetscErrorCode CheckKind(HycoMaterial law, const MFront *m)
 {
-  const char *const *interface = (const char *const *)Find(m, NULL, "mfront_interface");
-  const unsigned version = Number(m, NULL, "api_version", 0);
+  const char *const *interface = (const char *const *)MfrontFind(m, NULL, "mfront_interface");
+  const unsigned version = MfrontReadNumber(m, NULL, "api_version", 0);
 
   PetscFunctionBegin;
-  HycoCheck(interface && Find(m, NULL, "mfront_mkt"),
+  HycoCheck(interface && MfrontFind(m, NULL, "mfront_mkt"),
             "body %s: the library has no behaviour %s of MFront's interfaces (no symbol %s_mfront_interface)",
             BodyName(law), m->behaviour, m->behaviour);
-  HycoCheck(strcmp(*interface, "Generic") == 0 && Number(m, NULL, "mfront_mkt", 0) == 1,
+  HycoCheck(strcmp(*interface, "Generic") == 0 && MfrontReadNumber(m, NULL, "mfront_mkt", 0) == 1,
             "body %s: %s is made for MFront's interface \"%s\"; build the library by mfront --interface=generic",
             BodyName(law), m->behaviour, *interface);
   HycoCheck(version == API_VERSION,
             "body %s: %s has version %u of MFront's generic interface; hyco supports version %d (TFEL 3.4.1 and later)",
             BodyName(law), m->behaviour, version, API_VERSION);
-  HycoCheck(Number(m, NULL, "BehaviourType", 0) == 1 && Number(m, NULL, "BehaviourKinematic", 0) == 1,
+  HycoCheck(MfrontReadNumber(m, NULL, "BehaviourType", 0) == 1 &&
+                MfrontReadNumber(m, NULL, "BehaviourKinematic", 0) == 1,
             "body %s: %s is not a small-strain law", BodyName(law), m->behaviour);
-  HycoCheck(!Number(m, NULL, "SymmetryType", 0),
+  HycoCheck(!MfrontReadNumber(m, NULL, "SymmetryType", 0),
             "body %s: %s is orthotropic, and hyco supports isotropic behaviours only", BodyName(law), m->behaviour);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* After both texts are read: declares the material properties as constants, H[1] under the name H_1. */
-static PetscErrorCode Declare(HycoMaterial law)
+static PetscErrorCode MfrontDeclare(HycoMaterial law)
 {
   MFront *m = (MFront *)law->data;
   const char *library, *const *names, *name;
@@ -181,9 +182,9 @@ static PetscErrorCode Declare(HycoMaterial law)
   HycoCheck(library && name, "body %s: law mfront needs library: (a file) and behaviour: (its name)", BodyName(law));
   PetscCall(PetscFree(m->behaviour));
   PetscCall(PetscStrallocpy(name, &m->behaviour));
-  PetscCall(Load(law, library, m));
+  PetscCall(MfrontLoad(law, library, m));
   PetscCall(CheckKind(law, m));
-  PetscCall(List(law, m, "Tridimensional", "MaterialProperties", &n, &names));
+  PetscCall(MfrontList(law, m, "Tridimensional", "MaterialProperties", &n, &names));
   HycoCheck(n <= HYCO_MAX_DECLARED - 2, "body %s: %s has %d material properties; hyco accepts at most %d",
             BodyName(law), name, (int)n, HYCO_MAX_DECLARED - 2);
   for (PetscInt j = 0; j < n; j++) {
@@ -217,8 +218,8 @@ static PetscErrorCode SetState(HycoMaterial law, const MFront *m, const char hyp
   PetscInt n, total = 0;
 
   PetscFunctionBegin;
-  PetscCall(List(law, m, hypothesis, "InternalStateVariables", &n, &names));
-  type = (const int *)Find(m, hypothesis, "InternalStateVariablesTypes");
+  PetscCall(MfrontList(law, m, hypothesis, "InternalStateVariables", &n, &names));
+  type = (const int *)MfrontFind(m, hypothesis, "InternalStateVariablesTypes");
   HycoCheck(!n || type, "body %s: the library has no symbol %s_InternalStateVariablesTypes", BodyName(law),
             m->behaviour);
   for (PetscInt k = 0; k < n; k++) {
@@ -254,32 +255,33 @@ static PetscErrorCode SetUp(HycoMaterial law, PetscInt dim)
   *(void **)(&m->integrate) = dlsym(m->library, symbol);
   HycoCheck(m->integrate, "body %s: %s does not support the hypothesis %s (no symbol %s)", BodyName(law), m->behaviour,
             hypothesis, symbol);
-  PetscCall(List(law, m, hypothesis, "MaterialProperties", &n, &names));
+  PetscCall(MfrontList(law, m, hypothesis, "MaterialProperties", &n, &names));
   HycoCheck(n == m->n_properties, "body %s: %s has other material properties in 2D than in 3D", BodyName(law),
             m->behaviour);
-  PetscCall(List(law, m, hypothesis, "ExternalStateVariables", &n, &names));
+  PetscCall(MfrontList(law, m, hypothesis, "ExternalStateVariables", &n, &names));
   for (PetscInt k = 0; k < n; k++)
     HycoCheck(strcmp(names[k], "Temperature") == 0,
               "body %s: %s needs the external variable %s; hyco provides the temperature only", BodyName(law),
               m->behaviour, names[k]);
-  HycoCheck(!Number(m, hypothesis, "requiresStiffnessTensor", 0) &&
-                !Number(m, hypothesis, "requiresThermalExpansionCoefficientTensor", 0),
+  HycoCheck(!MfrontReadNumber(m, hypothesis, "requiresStiffnessTensor", 0) &&
+                !MfrontReadNumber(m, hypothesis, "requiresThermalExpansionCoefficientTensor", 0),
             "body %s: %s requires the stiffness or the thermal expansion as input; let it compute them", BodyName(law),
             m->behaviour);
-  m->stores = (PetscBool)(Number(m, hypothesis, "ComputesInternalEnergy", 0) == 1);
+  m->stores = (PetscBool)(MfrontReadNumber(m, hypothesis, "ComputesInternalEnergy", 0) == 1);
   PetscCall(SetState(law, m, hypothesis, dim));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The interface's index of our components; shear has a factor. */
 static const PetscInt theirs[6] = {0, 1, 2, 3, 5, 4};
-static PetscReal Root(PetscInt c)
+static PetscReal MfrontRoot(PetscInt c)
 {
   return c < 3 ? 1 : PetscSqrtReal(2);
 }
 
 /* Integrates one point; false, with the behaviour's message, if it has no solution. */
-static PetscBool Integrate(const MFront *m, HycoMaterialPoints *p, PetscInt i, PetscInt n_state, char message[MESSAGE])
+static PetscBool MfrontIntegrate(const MFront *m, HycoMaterialPoints *p, PetscInt i, PetscInt n_state,
+                                 char message[MESSAGE])
 {
   const PetscInt ns = p->n_strain;
   const PetscBool at_rest = (PetscBool)(p->strain0 == p->strain);
@@ -291,9 +293,9 @@ static PetscBool Integrate(const MFront *m, HycoMaterialPoints *p, PetscInt i, P
 
   for (PetscInt j = 0; j < m->n_properties; j++) properties[j] = p->constant[2 + j][i];
   for (PetscInt c = 0; c < ns; c++) {
-    e0[theirs[c]] = p->strain0[i * ns + c] / Root(c);
-    e1[theirs[c]] = p->strain[i * ns + c] / Root(c);
-    s0[theirs[c]] = s1[theirs[c]] = p->stress0[i * ns + c] * Root(c);
+    e0[theirs[c]] = p->strain0[i * ns + c] / MfrontRoot(c);
+    e1[theirs[c]] = p->strain[i * ns + c] / MfrontRoot(c);
+    s0[theirs[c]] = s1[theirs[c]] = p->stress0[i * ns + c] * MfrontRoot(c);
   }
   /* The interface updates the state at the end in place, starting from that at the begin. */
   for (PetscInt k = 0; k < n_state; k++) p->state[i * n_state + k] = p->state0[i * n_state + k];
@@ -305,22 +307,22 @@ static PetscBool Integrate(const MFront *m, HycoMaterialPoints *p, PetscInt i, P
   if ((*m->integrate)(&d) < 0) return PETSC_FALSE;
   p->dt_factor = PetscMin(p->dt_factor, rdt);
   for (PetscInt r = 0; r < ns; r++) {
-    p->stress[i * ns + r] = s1[theirs[r]] / Root(r);
+    p->stress[i * ns + r] = s1[theirs[r]] / MfrontRoot(r);
     for (PetscInt c = 0; p->tangent && c < ns; c++)
-      p->tangent[(i * ns + r) * ns + c] = K[theirs[r] * ns + theirs[c]] / (Root(r) * Root(c));
+      p->tangent[(i * ns + r) * ns + c] = K[theirs[r] * ns + theirs[c]] / (MfrontRoot(r) * MfrontRoot(c));
   }
   if (p->stored && m->stores) p->stored[i] = stored1;
   return PETSC_TRUE;
 }
 
 /* The first point that fails ends the batch: the step is repeated with a smaller time anyway. */
-static PetscErrorCode Update(HycoMaterial law, HycoMaterialPoints *p)
+static PetscErrorCode MfrontUpdate(HycoMaterial law, HycoMaterialPoints *p)
 {
   MFront *m = (MFront *)law->data;
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < p->n; i++) {
-    if (Integrate(m, p, i, law->n_state, m->message)) continue;
+    if (MfrontIntegrate(m, p, i, law->n_state, m->message)) continue;
     m->message[MESSAGE - 1] = '\0';
     p->failed = i;
     p->why = m->message[0] ? m->message : "the behaviour did not converge";
@@ -329,7 +331,7 @@ static PetscErrorCode Update(HycoMaterial law, HycoMaterialPoints *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Destroy(HycoMaterial law)
+static PetscErrorCode MfrontDestroy(HycoMaterial law)
 {
   MFront *m = (MFront *)law->data;
 
@@ -339,15 +341,16 @@ static PetscErrorCode Destroy(HycoMaterial law)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The constants of the behaviour are declared later, by Declare(), when the scene has named the library. */
-static PetscErrorCode Create(HycoMaterial law)
+/* The constants of the behaviour are declared later, by MfrontDeclare(), when the scene has named the library. */
+static PetscErrorCode MfrontCreate(HycoMaterial law)
 {
-  static const struct _HycoMaterialOps ops = {.declare = Declare, .setup = SetUp, .update = Update, .destroy = Destroy};
+  static const struct _HycoMaterialOps ops = {
+      .declare = MfrontDeclare, .setup = SetUp, .update = MfrontUpdate, .destroy = MfrontDestroy};
   MFront *m;
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&m));
-  /* First, so that Destroy() finds it also after an error below. */
+  /* First, so that MfrontDestroy() finds it also after an error below. */
   PetscCall(HycoMaterialSetData(law, m));
   PetscCall(HycoMaterialDeclareText(law, "library", "the file of a shared library"));
   PetscCall(HycoMaterialDeclareText(law, "behaviour", "the behaviour's name"));
@@ -356,4 +359,4 @@ static PetscErrorCode Create(HycoMaterial law)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-HycoDefineExtension(mfront, HycoMaterialRegister(HYCO_MATERIAL_MFRONT, Create))
+HycoDefineExtension(mfront, HycoMaterialRegister(HYCO_MATERIAL_MFRONT, MfrontCreate))

@@ -57,8 +57,8 @@ static PetscErrorCode SetFromOptions(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The modes are those of displacements, which the reducer has; only the store is kept for Build(). */
-static PetscErrorCode Modes(HycoReducer t, HycoSnapshots store)
+/* The modes are those of displacements, which the reducer has; only the store is kept for RegressionBuild(). */
+static PetscErrorCode RegressionModes(HycoReducer t, HycoSnapshots store)
 {
   PetscFunctionBegin;
   ((Training)t->training)->store = store;
@@ -88,7 +88,7 @@ static PetscErrorCode ReadCells(HycoReducer t, HycoROM m, const char field[], Pe
 }
 
 /* Columns by training point and, with a history, by listed time: the same weights serve all of its times. */
-static PetscErrorCode Build(HycoROM m, HycoReducer t)
+static PetscErrorCode RegressionBuild(HycoROM m, HycoReducer t)
 {
   Regression r = (Regression)m->model->data;
   const PetscInt n_sigma = t->fom->fe->n_sigma;
@@ -111,7 +111,7 @@ static PetscErrorCode Build(HycoROM m, HycoReducer t)
 }
 
 /* Without errors of its own: at the training points it has none. */
-static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *out)
+static PetscErrorCode RegressionReport(HycoReducer t, HycoROM m, HycoTraining *out)
 {
   PetscFunctionBegin;
   (void)t;
@@ -124,7 +124,7 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *out)
 
 /* -- online -- */
 
-static PetscReal Kernel(PetscInt kernel, PetscReal r)
+static PetscReal RegressionKernel(PetscInt kernel, PetscReal r)
 {
   /* All three are conditionally positive definite of order 2 at most: the linear polynomial makes the system
      regular. */
@@ -134,14 +134,14 @@ static PetscReal Kernel(PetscInt kernel, PetscReal r)
 }
 
 /* The system's column of a point: kernels at the training points, 1, the scaled parameters. */
-static void Column(HycoROM m, const PetscReal mu[], PetscReal column[])
+static void RegressionColumn(HycoROM m, const PetscReal mu[], PetscReal column[])
 {
   const HycoScene s = m->model->scene;
   const PetscInt n = m->model->n_points, n_par = s->n_parameters;
 
   for (PetscInt k = 0; k < n; k++)
-    column[k] =
-        Kernel(((Regression)m->model->data)->kernel, HycoEstimatesDistance(s, mu, m->model->points + k * n_par));
+    column[k] = RegressionKernel(((Regression)m->model->data)->kernel,
+                                 HycoEstimatesDistance(s, mu, m->model->points + k * n_par));
   column[n] = 1;
   for (PetscInt p = 0; p < n_par; p++)
     column[n + 1 + p] = (mu[p] - s->lo[p]) / (s->hi[p] > s->lo[p] ? s->hi[p] - s->lo[p] : 1);
@@ -150,7 +150,7 @@ static void Column(HycoROM m, const PetscReal mu[], PetscReal column[])
 #define SINGULAR 1e-13 /* points on one plane do not determine the polynomial: its least norm is taken */
 
 /* The inverse of the system, with the polynomial's columns beside and below the kernels'. */
-static PetscErrorCode Invert(HycoROM m)
+static PetscErrorCode RegressionInvert(HycoROM m)
 {
   const Work w = (Work)m->work;
   const PetscInt n = m->model->n_points, size = n + 1 + m->model->scene->n_parameters;
@@ -162,7 +162,7 @@ static PetscErrorCode Invert(HycoROM m)
   for (PetscInt k = 0; k < n; k++) {
     PetscReal *column = A + (size_t)k * (size_t)size;
 
-    Column(m, m->model->points + k * m->model->scene->n_parameters, column);
+    RegressionColumn(m, m->model->points + k * m->model->scene->n_parameters, column);
     /* Beside the kernels the same numbers as below them: the system is symmetric, with zeros in its last block. */
     for (PetscInt i = n; i < size; i++) A[(size_t)i * (size_t)size + (size_t)k] = column[i];
   }
@@ -187,12 +187,12 @@ static PetscErrorCode SetUp(HycoROM m)
   PetscCall(PetscCalloc1(PetscMax(1, m->model->scene->n_times), &w->step));
   w->largest = 0;
   for (PetscInt k = 0; k < r->n_columns * m->model->pairs.n; k++) w->largest = PetscMax(w->largest, r->Lambda[k]);
-  PetscCall(Invert(m));
+  PetscCall(RegressionInvert(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Of the work data alone: the model's values stay. */
-static PetscErrorCode Reset(HycoROM m)
+static PetscErrorCode RegressionReset(HycoROM m)
 {
   const Work w = (Work)m->work;
 
@@ -202,12 +202,12 @@ static PetscErrorCode Reset(HycoROM m)
 }
 
 /* The training points' weights at mu. */
-static void Weigh(HycoROM m, const PetscReal mu[])
+static void RegressionWeigh(HycoROM m, const PetscReal mu[])
 {
   const Work w = (Work)m->work;
   const PetscInt n = m->model->n_points, size = n + 1 + m->model->scene->n_parameters;
 
-  Column(m, mu, w->right);
+  RegressionColumn(m, mu, w->right);
   for (PetscInt k = 0; k < n; k++) {
     w->weight[k] = 0;
     for (PetscInt i = 0; i < size; i++) w->weight[k] += w->inverse[(size_t)k * (size_t)size + (size_t)i] * w->right[i];
@@ -216,7 +216,8 @@ static void Weigh(HycoROM m, const PetscReal mu[])
 
 /* The weighted sum of the points' columns of listed time `step`, `rows` numbers each; values below `least` are
    raised to it. */
-static void Sum(HycoROM m, PetscInt step, PetscInt rows, const PetscReal data[], PetscReal least, PetscReal value[])
+static void RegressionSum(HycoROM m, PetscInt step, PetscInt rows, const PetscReal data[], PetscReal least,
+                          PetscReal value[])
 {
   const Work w = (Work)m->work;
   const PetscInt steps = HycoSnapshotsSteps(m->model->scene);
@@ -233,14 +234,14 @@ static void Sum(HycoROM m, PetscInt step, PetscInt rows, const PetscReal data[],
 #define NO_FORCE 1e-12 /* share of the largest in training: round-off */
 
 /* Displacement and forces at mu (all variables), with a history at listed time `step`. */
-static PetscErrorCode Evaluate(HycoROM m, PetscInt step, const PetscReal mu[])
+static PetscErrorCode RegressionEvaluate(HycoROM m, PetscInt step, const PetscReal mu[])
 {
   const Regression r = (Regression)m->model->data;
   const Work w = (Work)m->work;
 
   PetscFunctionBegin;
-  Sum(m, step, m->model->l, r->gamma, PETSC_MIN_REAL, m->gamma);
-  Sum(m, step, m->model->pairs.n, r->Lambda, 0, m->Lambda);
+  RegressionSum(m, step, m->model->l, r->gamma, PETSC_MIN_REAL, m->gamma);
+  RegressionSum(m, step, m->model->pairs.n, r->Lambda, 0, m->Lambda);
   for (PetscInt k = 0; k < m->model->pairs.n; k++)
     m->Lambda[k] = m->Lambda[k] > NO_FORCE * w->largest ? m->Lambda[k] : 0;
   PetscCall(HycoROMSetSolution(m, mu, NULL, NULL));
@@ -249,7 +250,7 @@ static PetscErrorCode Evaluate(HycoROM m, PetscInt step, const PetscReal mu[])
 }
 
 /* Adds the current listed time, with the fields of its cells. */
-static PetscErrorCode List(HycoROM m, PetscInt step, PetscReal t)
+static PetscErrorCode RegressionList(HycoROM m, PetscInt step, PetscReal t)
 {
   const Regression r = (Regression)m->model->data;
   const Work w = (Work)m->work;
@@ -265,8 +266,8 @@ static PetscErrorCode List(HycoROM m, PetscInt step, PetscReal t)
   s->stored = NAN; /* not known */
   PetscCall(HycoTraceAdd(m, t));
   PetscCall(HycoTraceList(m, &sigma, &inelastic));
-  Sum(m, step, n_cells * ns, r->sigma, PETSC_MIN_REAL, sigma);
-  Sum(m, step, n_cells, r->inelastic, 0, inelastic);
+  RegressionSum(m, step, n_cells * ns, r->sigma, PETSC_MIN_REAL, sigma);
+  RegressionSum(m, step, n_cells, r->inelastic, 0, inelastic);
   for (PetscInt e = 0; e < n_cells; e++) {
     s->mises = PetscMax(s->mises, HycoMises(m->fe->dim, sigma + e * ns));
     s->inelastic = PetscMax(s->inelastic, inelastic[e]);
@@ -276,7 +277,7 @@ static PetscErrorCode List(HycoROM m, PetscInt step, PetscReal t)
 }
 
 /* All listed times; the residuals are the largest of them. */
-static PetscErrorCode Path(HycoROM m, const PetscReal mu[])
+static PetscErrorCode RegressionPath(HycoROM m, const PetscReal mu[])
 {
   const HycoScene s = m->model->scene;
   const Work w = (Work)m->work;
@@ -290,8 +291,8 @@ static PetscErrorCode Path(HycoROM m, const PetscReal mu[])
     PetscReal all[HYCO_MAX_PARAMETERS];
 
     HycoSceneSetTime(s, mu, s->times[k], all);
-    PetscCall(Evaluate(m, k, all));
-    PetscCall(List(m, k, s->times[k]));
+    PetscCall(RegressionEvaluate(m, k, all));
+    PetscCall(RegressionList(m, k, s->times[k]));
     worst.penetration = PetscMax(worst.penetration, p->kkt.penetration);
     worst.adhesion = PetscMax(worst.adhesion, p->kkt.adhesion);
     worst.complementarity = PetscMax(worst.complementarity, p->kkt.complementarity);
@@ -311,25 +312,25 @@ static PetscErrorCode Path(HycoROM m, const PetscReal mu[])
 }
 
 /* Weights once for the whole path: they depend on mu and not on time. */
-static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
+static PetscErrorCode RegressionSolve(HycoROM m, const PetscReal mu[])
 {
   PetscReal all[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
-  Weigh(m, mu);
+  RegressionWeigh(m, mu);
   if (m->model->scene->n_times) {
-    PetscCall(Path(m, mu));
+    PetscCall(RegressionPath(m, mu));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   HycoSceneSetTime(m->model->scene, mu, 0, all);
-  PetscCall(Evaluate(m, 0, all));
+  PetscCall(RegressionEvaluate(m, 0, all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* -- file, description -- */
 
 /* Writes to the model file, or reads from it. */
-static PetscErrorCode Move(HycoROM m, HycoH5 h)
+static PetscErrorCode RegressionMove(HycoROM m, HycoH5 h)
 {
   Regression r = (Regression)m->model->data;
   const PetscInt n_sigma = HycoStrainSize(m->model->mesh->dim);
@@ -348,7 +349,7 @@ static PetscErrorCode Move(HycoROM m, HycoH5 h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode View(HycoROM m, PetscViewer viewer)
+static PetscErrorCode RegressionView(HycoROM m, PetscViewer viewer)
 {
   const Regression r = (Regression)m->model->data;
 
@@ -362,7 +363,7 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 }
 
 /* The work data belong to the class. */
-static PetscErrorCode Destroy(HycoROM m)
+static PetscErrorCode RegressionDestroy(HycoROM m)
 {
   Regression r = (Regression)m->model->data;
 
@@ -372,15 +373,20 @@ static PetscErrorCode Destroy(HycoROM m)
 }
 
 /* No settings: neither modes nor tolerances may be reduced online, since each value is a function of its own. */
-static PetscErrorCode Create(HycoROM m)
+static PetscErrorCode RegressionCreate(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "regression",
                                        .work = sizeof(*(Work)NULL),
                                        .settings = HYCO_SETTINGS_NONE,
                                        .history = PETSC_TRUE,
                                        .integrals = PETSC_TRUE};
-  static const HycoROMOps ops = {
-      .setup = SetUp, .reset = Reset, .solve = Solve, .view = View, .save = Move, .load = Move, .destroy = Destroy};
+  static const HycoROMOps ops = {.setup = SetUp,
+                                 .reset = RegressionReset,
+                                 .solve = RegressionSolve,
+                                 .view = RegressionView,
+                                 .save = RegressionMove,
+                                 .load = RegressionMove,
+                                 .destroy = RegressionDestroy};
   Regression r;
 
   PetscFunctionBegin;
@@ -392,16 +398,17 @@ static PetscErrorCode Create(HycoROM m)
 static PetscErrorCode CreateTrainer(HycoTrainerOps *ops)
 {
   PetscFunctionBegin;
-  *ops = (HycoTrainerOps){.setfromoptions = SetFromOptions, .modes = Modes, .build = Build, .report = Report};
+  *ops = (HycoTrainerOps){
+      .setfromoptions = SetFromOptions, .modes = RegressionModes, .build = RegressionBuild, .report = RegressionReport};
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Register(void)
+static PetscErrorCode RegressionRegister(void)
 {
   PetscFunctionBegin;
-  PetscCall(HycoROMRegister(HYCO_ROM_REGRESSION, Create));
+  PetscCall(HycoROMRegister(HYCO_ROM_REGRESSION, RegressionCreate));
   PetscCall(HycoTrainerRegister(HYCO_ROM_REGRESSION, CreateTrainer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-HycoDefineExtension(regression, Register())
+HycoDefineExtension(regression, RegressionRegister())

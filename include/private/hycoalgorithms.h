@@ -88,7 +88,7 @@ PetscInt HycoNNLSStep(PetscInt k, const PetscInt p[], const PetscReal z[], Petsc
   values (confidence 0.75). Rows with the same number group[i] depend on each other. X: n x p row major; c: p + 1. Not
   collective.
 */
-PetscErrorCode HycoUpperBound(PetscInt n, PetscInt telling, const PetscInt group[], PetscInt p, const PetscReal X[],
+PetscErrorCode HycoUpperBound(PetscInt n, PetscInt explanatory, const PetscInt group[], PetscInt p, const PetscReal X[],
                               const PetscReal y[], PetscReal share, PetscReal c[]);
 /* Sets only c[p], for given c_j. */
 PetscErrorCode HycoRaiseBound(PetscInt n, const PetscInt group[], PetscInt p, const PetscReal X[], const PetscReal y[],
@@ -117,7 +117,8 @@ PetscErrorCode HycoNNMF(PetscInt m, PetscInt n, const PetscReal S[], PetscInt k,
 
 /* The first k columns chosen by QR with column pivoting of A (m x n column major, overwritten). Not collective. */
 PetscErrorCode HycoPivotColumns(PetscInt m, PetscInt n, PetscReal A[], PetscInt k, PetscInt pivot[]);
-/* The min(m, n) singular values s of A (m x n column major, kept), in descending order; their extremes. Not collective. */
+/* The min(m, n) singular values s of A (m x n column major, kept), in descending order; their extremes. Not
+   collective. */
 PetscErrorCode HycoSingularValues(PetscInt m, PetscInt n, const PetscReal A[], PetscReal s[]);
 PetscErrorCode HycoExtremeSingularValues(PetscInt m, PetscInt n, const PetscReal A[], PetscReal *smallest,
                                          PetscReal *largest);

@@ -28,7 +28,8 @@ typedef struct {
   PetscReal Q[9], s;  /* Q row major, orthogonal */
   PetscReal residual; /* relative distance of the nodes from this map */
 } HycoPose;
-/* The nodes' sums over each of n bodies of fom's part (of: by node), with those of X0 (3 a node): pose[n]. Collective. */
+/* The nodes' sums over each of n bodies of fom's part (of: by node), with those of X0 (3 a node): pose[n].
+   Collective. */
 PetscErrorCode HycoBodyPoses(HycoFOM fom, PetscInt n, const PetscInt of[], const PetscReal X0[], HycoPose pose[]);
 /* The pose from n points x of their reference X. */
 void HycoPoseFit(PetscInt dim, PetscInt n, const PetscReal X[], const PetscReal x[], HycoPose *pose);
@@ -70,9 +71,9 @@ static inline void HycoBodiesAdd(PetscInt n, PetscReal factor, const PetscReal f
   BLASaxpy_(&size, &factor, from, &one, to, &one);
 }
 
-/* A matrix of a body, rows x n, its flexibility or the responses of other unknowns: the sum over its terms of share[] C_t,
-   the share of a term its polynomial of theta, one of those that are orthonormal on the samples; the first is constant. An
-   unknown has its columns of all terms side by side, because a prediction reads them together. */
+/* A matrix of a body, rows x n, its flexibility or the responses of other unknowns: the sum over its terms of share[]
+   C_t, the share of a term its polynomial of theta, one of those that are orthonormal on the samples; the first is
+   constant. An unknown has its columns of all terms side by side, because a prediction reads them together. */
 typedef struct {
   PetscInt rows, n, n_terms, n_wide; /* n: unknowns; terms; those in double precision, the first ones */
   PetscInt *term;                    /* their polynomials, the constant one first */
@@ -80,9 +81,9 @@ typedef struct {
   PetscReal *wide;
   float *narrow;
 } HycoFlexibility;
-/* From the samples at the tensor's nodes, by columns. least 0: all terms in double precision; > 0: the first one and those
-   with entries above `single`, the others in single precision, without those whose entries are all below `least`, relative
-   to the scales of their row and column: scale[rows + n], or NULL for the roots of the diagonal. */
+/* From the samples at the tensor's nodes, by columns. least 0: all terms in double precision; > 0: the first one and
+   those with entries above `single`, the others in single precision, without those whose entries are all below `least`,
+   relative to the scales of their row and column: scale[rows + n], or NULL for the roots of the diagonal. */
 PetscErrorCode HycoFlexibilityCreate(const HycoTensor *tensor, PetscInt rows, PetscInt n,
                                      const PetscReal *const sample[], const PetscReal scale[], PetscReal least,
                                      PetscReal single, HycoFlexibility *f);
@@ -126,7 +127,8 @@ static inline PetscInt HycoCellUnknown(HycoMesh m, PetscInt e, PetscInt i)
 {
   return m->cells[e * m->nv + i / m->dim] * m->dim + i % m->dim;
 }
-/* What is inelastic: u = ... + P alpha / kappa, alpha = T^T s of what the stresses lack of the elastic ones at few points. */
+/* What is inelastic: u = ... + P alpha / kappa, alpha = T^T s of what the stresses lack of the elastic ones at few
+   points. */
 typedef struct {
   PetscInt m, n_points; /* modes; integration points at which the laws are evaluated */
   PetscInt *point;   /* the number of its cell in the whole mesh times the points of a cell, plus its own; ascending */
@@ -155,9 +157,10 @@ static inline PetscReal HycoBodiesValue(PetscInt variable, PetscReal x)
   return variable == HYCO_BODIES_RECIPROCAL ? -1 / x : x;
 }
 
-/* The rigid motions of bodies that contact alone holds, where the shape of one changes: a table over the variables of theta.
-   Of each motion the coefficients (HycoRigidRow()) of the one that moves its pin by 1 and no other one, then of each body
-   and load the sums of the load times those rows, 6 numbers each, about the centre and by the size of the body. */
+/* The rigid motions of bodies that contact alone holds, where the shape of one changes: a table over the variables of
+   theta. Of each motion the coefficients (HycoRigidRow()) of the one that moves its pin by 1 and no other one, then of
+   each body and load the sums of the load times those rows, 6 numbers each, about the centre and by the size of the
+   body. */
 typedef struct {
   PetscInt *n_nodes, *body; /* values of each theta; by motion: the body that it moves */
   PetscReal *node, *frame;  /* the values; by body: 3 of its centre, its size */
@@ -194,7 +197,7 @@ typedef struct _n_HycoSubstructures {
   HycoBodiesInelastic inelastic; /* NULL: no history */
 } * HycoSubstructures;
 
-/* Rows of B in the bodies' axes that the last prediction had too, and what follows from them (bodies_kept.c). */
+/* Rows of B in the bodies' axes that the last prediction had too, and what follows from them (bodies_row_cache.c). */
 typedef struct {
   PetscBool same;          /* the rows are the last ones */
   PetscInt count;          /* of the rows so far that were not the last ones */
@@ -204,11 +207,11 @@ typedef struct {
   PetscReal **blend;  /* by contact and body: P at the weights of its samples; NULL: not made. Of bodies with several */
   PetscInt *at_weights, *weights; /* by contact and body: which weights; by body: the number of the present ones */
   PetscReal bytes;                /* of all P, W and blend */
-} HycoBodiesKept;
+} HycoBodiesRowCache;
 
 /* What solves change. In the bodies' axes: c of the loads (r); displacements of the surfaces without contact (free, ns)
    and with it, then of the unknowns inside (u, ns + ni); forces on the surfaces (f, ns); x (p). */
-typedef struct _n_HycoBodiesBeside *HycoBodiesBeside;
+typedef struct _n_HycoBodiesPerturbed *HycoBodiesPerturbed;
 typedef struct _n_HycoBodiesWork {
   HycoSubstructures bodies;                /* borrowed */
   PetscReal **weight;                      /* by body: of its samples */
@@ -232,7 +235,7 @@ typedef struct _n_HycoBodiesWork {
   PetscInt n_placed, *placed, *placed_in; /* its nodes with a place, and their bodies */
   PetscInt *row_start, *row_at, row_room; /* the rows of B in the bodies' axes */
   PetscReal *row;
-  HycoBodiesKept kept;
+  HycoBodiesRowCache kept;
   PetscReal *gap;    /* by contact: without the forces */
   PetscBool *active; /* of the contacts in the problem */
   HycoTao tao;       /* the active set; if it fails, or another method is asked for: */
@@ -242,8 +245,8 @@ typedef struct _n_HycoBodiesWork {
   PetscInt its;
   char method[64];
   const PetscReal *alpha,
-      *dalpha;             /* of gradients: the inelastic strains, and their change (borrowed); NULL: there are none */
-  HycoBodiesBeside beside; /* of gradients (bodies_gradient.c); NULL: not needed yet */
+      *dalpha; /* of gradients: the inelastic strains, and their change (borrowed); NULL: there are none */
+  HycoBodiesPerturbed beside; /* of gradients (bodies_gradient.c); NULL: not needed yet */
 } * HycoBodiesWork;
 
 /* NULL-safe. */
@@ -259,7 +262,8 @@ static inline PetscBool HycoBodiesAxis(HycoSubstructures bodies, PetscInt k, Pet
 {
   return (PetscBool)(bodies->body[k].tensor.n[p] > 1);
 }
-/* The parameters at which the axes of body k are those of the scene: `first`, with those that change its shape as in mu. */
+/* The parameters at which the axes of body k are those of the scene: `first`, with those that change its shape as in
+   mu. */
 void HycoBodiesReference(HycoSubstructures bodies, PetscInt k, const PetscReal mu[], PetscReal reference[]);
 /* weight[n_samples]: of the samples of body k at mu. */
 PetscErrorCode HycoBodiesWeights(HycoSubstructures bodies, PetscInt k, const PetscReal mu[], PetscReal weight[]);
@@ -274,22 +278,22 @@ PetscErrorCode HycoBodiesReset(HycoBodiesWork work);
 PetscErrorCode HycoBodiesSolve(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal mu[],
                                PetscReal Lambda[], PetscBool *solved);
 /* The parts of HycoBodiesSolve(): the bodies, loads and rows at mu; the gaps without forces for inelastic strains alpha
-   (NULL: none); the forces then. HycoBodiesGiven(): f and u for given forces. */
+   (NULL: none); the forces then. HycoBodiesDisplacementsOfForces(): f and u for given forces. */
 PetscErrorCode HycoBodiesPrepare(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal mu[]);
 PetscErrorCode HycoBodiesStrain(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal alpha[]);
 PetscErrorCode HycoBodiesContact(HycoBodiesWork work, const HycoBodiesSurface *surface, PetscReal Lambda[],
                                  PetscBool *solved);
-void HycoBodiesGiven(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal Lambda[]);
+void HycoBodiesDisplacementsOfForces(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal Lambda[]);
 /* After HycoBodiesPrepare(), with x set: u for forces f on the surfaces' unknowns (ns). */
 PetscErrorCode HycoBodiesRespond(HycoBodiesWork work, const PetscReal f[]);
 /* Compares the rows of m contacts with the last ones: kept.same, and takes them. */
 PetscErrorCode HycoBodiesKeepRows(HycoBodiesWork work, PetscInt m);
-PetscErrorCode HycoBodiesForgetKept(HycoBodiesWork work);
+PetscErrorCode HycoBodiesResetRowCache(HycoBodiesWork work);
 /* If the rows are the last ones: P and W of n contacts, unless they need too much memory (kept.same is false then). */
 PetscErrorCode HycoBodiesKeep(HycoBodiesWork work, PetscInt n, const PetscInt contact[]);
 /* row[n]: of the matrix W at the present parameters, contact k with n contacts; u -= C B^T Lambda. */
-void HycoBodiesKeptRow(HycoBodiesWork work, PetscInt k, PetscInt n, const PetscInt contact[], PetscReal row[]);
-PetscErrorCode HycoBodiesKeptDisplace(HycoBodiesWork work, PetscInt m, const PetscReal Lambda[], PetscReal u[]);
+void HycoBodiesRowCacheGet(HycoBodiesWork work, PetscInt k, PetscInt n, const PetscInt contact[], PetscReal row[]);
+PetscErrorCode HycoBodiesRowCacheDisplace(HycoBodiesWork work, PetscInt m, const PetscReal Lambda[], PetscReal u[]);
 /* Friction between the bodies (bodies_friction.c): steps of a path on the rows with tangents. surface: with the normal
    rows alone (borrowed). */
 typedef struct _n_HycoBodiesFriction *HycoBodiesFriction;
@@ -302,74 +306,78 @@ const HycoBodiesSurface *HycoBodiesFrictionSurface(HycoBodiesFriction friction);
 PetscErrorCode HycoBodiesFrictionBegin(HycoBodiesFriction friction);
 /* HycoBodiesPrepare() with tangents, once the surface's fe is at mu. */
 PetscErrorCode HycoBodiesFrictionPrepare(HycoBodiesFriction friction, HycoBodiesWork work, const PetscReal mu[]);
-/* The forces of the step to the time t, and u, f of work; *solved: the residual of the contacts, recomputed from them, is
-   small. */
+/* The forces of the step to the time t, and u, f of work; *solved: the residual of the contacts, recomputed from them,
+   is small. */
 PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction friction, HycoBodiesWork work, PetscReal t, HycoKKT *kkt,
                                        PetscInt *its, PetscBool *solved);
 /* The solved step becomes the state of the contacts at t. */
 PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction friction, HycoBodiesWork work, PetscReal t);
-/* The parts of a step of bodies that deform inelastically: the forces at alpha (`again`: not the first alpha of the step),
-   with x of work, o->free and the gaps; u, f and the residuals for these forces. */
-PetscErrorCode HycoBodiesFrictionTouch(HycoBodiesFriction friction, HycoBodiesWork work, PetscReal t,
-                                       const PetscReal alpha[], PetscBool again, PetscInt *its, PetscBool *solved);
+/* The parts of a step of bodies that deform inelastically: the forces at alpha (`again`: not the first alpha of the
+   step), with x of work, o->free and the gaps; u, f and the residuals for these forces. */
+PetscErrorCode HycoBodiesFrictionSolveContact(HycoBodiesFriction friction, HycoBodiesWork work, PetscReal t,
+                                              const PetscReal alpha[], PetscBool again, PetscInt *its,
+                                              PetscBool *solved);
 PetscErrorCode HycoBodiesFrictionMove(HycoBodiesFriction friction, HycoBodiesWork work, HycoKKT *kkt);
 /* w (by row) of a step from rest to mu with the motions and forces z, which become those of the last step. */
 PetscErrorCode HycoBodiesFrictionProbe(HycoBodiesFriction friction, HycoBodiesWork work, const PetscReal mu[],
                                        const PetscReal z[], PetscReal w[]);
 /* After a solve that failed: whether no forces with this friction balance the loads on the rigid motions. */
-PetscErrorCode HycoBodiesFrictionSlides(HycoBodiesFriction friction, HycoBodiesWork work, char name[HYCO_LINE],
-                                        PetscBool *slides);
+PetscErrorCode HycoBodiesFrictionNoEquilibrium(HycoBodiesFriction friction, HycoBodiesWork work, char name[HYCO_LINE],
+                                               PetscBool *no_equilibrium);
 /*
-  The derivatives of a path of elastic bodies (bodies_along.c), as the ops `stand`, `rest`, `beside`, `along` and `show`; Destroy before that of the
-  friction.
+  The derivatives of a path of elastic bodies (bodies_sensitivity.c), as the ops `linearise`, `step_residual`,
+  `perturbed`, `sensitivity` and `show`; Destroy before that of the friction.
 */
-PetscErrorCode HycoBodiesAlongDestroy(HycoBodiesFriction friction);
-PetscErrorCode HycoBodiesAlongStand(HycoROM model, HycoBodiesFriction friction, HycoBodiesWork work, PetscInt k,
-                                    const PetscReal alpha[], PetscBool *able);
-void HycoBodiesAlongRest(HycoBodiesFriction friction, const PetscInt **row, PetscReal w[], PetscReal *size);
-PetscErrorCode HycoBodiesAlongNear(HycoROM model, HycoBodiesFriction friction, const PetscReal mu[],
-                                   const PetscInt row[], PetscBool rows, const PetscReal z[], PetscInt point,
-                                   PetscReal w[]);
-PetscErrorCode HycoBodiesAlongStep(HycoBodiesFriction friction, PetscInt parameter, const PetscReal weight[3],
-                                   const PetscInt point[3], const PetscReal q[], PetscReal dz[], PetscBool *regular);
-/* After the last HycoBodiesAlongStep() of a parameter: its slips and work. */
-void HycoBodiesAlongTake(HycoBodiesFriction friction, PetscInt parameter, const PetscReal dz[]);
-PetscErrorCode HycoBodiesAlongShow(HycoROM model, HycoBodiesFriction friction, PetscInt parameter, PetscBool rows,
-                                   PetscReal step, const PetscReal dz[]);
+PetscErrorCode HycoBodiesSensitivityDestroy(HycoBodiesFriction friction);
+PetscErrorCode HycoBodiesSensitivityLinearise(HycoROM model, HycoBodiesFriction friction, HycoBodiesWork work,
+                                              PetscInt k, const PetscReal alpha[], PetscBool *able);
+void HycoBodiesSensitivityResidual(HycoBodiesFriction friction, const PetscInt **row, PetscReal w[], PetscReal *size);
+PetscErrorCode HycoBodiesSensitivityPerturbed(HycoROM model, HycoBodiesFriction friction, const PetscReal mu[],
+                                              const PetscInt row[], PetscBool rows, const PetscReal z[], PetscInt point,
+                                              PetscReal w[]);
+PetscErrorCode HycoBodiesSensitivityAdvance(HycoBodiesFriction friction, PetscInt parameter, const PetscReal weight[3],
+                                            const PetscInt point[3], const PetscReal q[], PetscReal dz[],
+                                            PetscBool *regular);
+/* After the last HycoBodiesSensitivityAdvance() of a parameter: its slips and work. */
+void HycoBodiesSensitivityAccept(HycoBodiesFriction friction, PetscInt parameter, const PetscReal dz[]);
+PetscErrorCode HycoBodiesSensitivityView(HycoROM model, HycoBodiesFriction friction, PetscInt parameter, PetscBool rows,
+                                         PetscReal step, const PetscReal dz[]);
 /* By row. Borrowed. */
 const PetscReal *HycoBodiesFrictionForces(HycoBodiesFriction friction);
-/* The derivative of the forces last found by alpha: Z (n_set x m row major), of the rows set[] of closed contacts, from BP =
-   B P / kappa (rows x m). *changed, true: Z is wanted in any case; afterwards whether set and Z have been made anew. */
+/* The derivative of the forces last found by alpha: Z (n_set x m row major), of the rows set[] of closed contacts, from
+   BP = B P / kappa (rows x m). *changed, true: Z is wanted in any case; afterwards whether set and Z have been made
+   anew. */
 PetscErrorCode HycoBodiesFrictionDerive(HycoBodiesFriction friction, PetscInt m, const PetscReal BP[],
                                         PetscBool *changed, PetscInt *n_set, PetscInt set[], PetscReal **Z,
                                         PetscBool *regular);
-/* The normal forces of the solved step; the state of the contacts, whose arrays the friction owns; whether the last step
-   has further solutions. */
+/* The normal forces of the solved step; the state of the contacts, whose arrays the friction owns; whether the last
+   step has further solutions. */
 void HycoBodiesFrictionNormal(HycoBodiesFriction friction, PetscReal Lambda[]);
 const HycoSlip *HycoBodiesFrictionSlip(HycoBodiesFriction friction);
-/* Whether a state accepted since the begin left a rigid motion free, which is then named unless name is NULL, or the last one
-   has loads but no forces. */
-PetscBool HycoBodiesFrictionLoose(HycoBodiesFriction friction, char name[HYCO_LINE]);
+/* Whether a state accepted since the begin left a rigid motion free, which is then named unless name is NULL, or the
+   last one has loads but no forces. */
+PetscBool HycoBodiesFrictionFreeMotion(HycoBodiesFriction friction, char name[HYCO_LINE]);
 PetscErrorCode HycoBodiesFrictionDisproven(HycoBodiesFriction friction, PetscBool *disproven);
-/* Parts of a solve for gradients. HycoBodiesBring(): the data of the bodies, c and the rows at mu, as HycoBodiesPrepare();
-   o->gap: those of the rows (surface NULL: these stay). HycoBodiesBlend(): sum[n] of the samples' numbers by their weights. HycoBodiesYield(): u -= C f /
-   kappa. HycoBodiesRows(): those of the fields of body k, of which n are turns times modes, then the unknowns inside;
-   HycoBodiesAddRows(): row += a x - H f. */
+/* Parts of a solve for gradients. HycoBodiesBring(): the data of the bodies, c and the rows at mu, as
+   HycoBodiesPrepare(); o->gap: those of the rows (surface NULL: these stay). HycoBodiesBlend(): sum[n] of the samples'
+   numbers by their weights. HycoBodiesAddCompliance(): u -= C f / kappa. HycoBodiesRows(): those of the fields of body
+   k, of which n are turns times modes, then the unknowns inside; HycoBodiesAddRows(): row += a x - H f. */
 PetscErrorCode HycoBodiesBring(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal mu[]);
 PetscReal HycoBodiesStretch(HycoBodiesWork work);
 PetscErrorCode HycoBodiesBlend(PetscInt n_samples, const PetscReal weight[], PetscInt n, const PetscReal data[],
                                PetscReal sum[]);
-PetscErrorCode HycoBodiesYield(HycoBodiesWork work, const PetscReal f[], PetscReal u[]);
+PetscErrorCode HycoBodiesAddCompliance(HycoBodiesWork work, const PetscReal f[], PetscReal u[]);
 PetscErrorCode HycoBodiesRows(HycoBodiesWork work, PetscInt k, PetscInt n, PetscReal row[]);
 PetscErrorCode HycoBodiesAddRows(HycoBodiesWork work, PetscInt k, const PetscReal share_a[], const PetscReal share_H[],
                                  const PetscReal x[], const PetscReal f[], PetscReal row[]);
-PetscErrorCode HycoBodiesForgetBeside(HycoBodiesWork work);
+PetscErrorCode HycoBodiesResetPerturbed(HycoBodiesWork work);
 /* Z and work of the bodies in the table of motions, at mu, where the surface's nodes are (NULL: Z stays). */
 PetscErrorCode HycoBodiesMoveMotions(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal mu[]);
-/* The derivatives of the displacements u[nd] of the points' cells, as HycoBodiesSlope(), with those of inelastic strains. */
-PetscErrorCode HycoBodiesCellsSlope(HycoBodiesWork work, PetscInt n, const PetscInt contact[],
-                                    const PetscReal weight[2], const PetscInt point[2], const PetscReal dz[],
-                                    const PetscReal dalpha[], const PetscReal u[], PetscReal du[]);
+/* The derivatives of the displacements u[nd] of the points' cells, as HycoBodiesDerivatives(), with those of inelastic
+   strains. */
+PetscErrorCode HycoBodiesCellsDerivatives(HycoBodiesWork work, PetscInt n, const PetscInt contact[],
+                                          const PetscReal weight[2], const PetscInt point[2], const PetscReal dz[],
+                                          const PetscReal dalpha[], const PetscReal u[], PetscReal du[]);
 /* The gaps of the model's contacts, and the largest term of one. */
 void HycoBodiesGaps(HycoROM model, PetscReal w[], PetscReal *size);
 /* w[p] of the present loads and forces, on the motions that contact alone prevents. */
@@ -392,14 +400,14 @@ PetscErrorCode HycoBodiesNear(HycoROM model, const PetscReal mu[], PetscInt n, c
 PetscErrorCode HycoBodiesNearSurface(HycoROM model, const HycoBodiesSurface *surface, const PetscReal gaps[],
                                      const PetscReal mu[], PetscInt n, const PetscInt contact[], PetscBool rows,
                                      const PetscReal z[], PetscInt point, PetscReal w[]);
-PetscErrorCode HycoBodiesSlope(HycoROM model, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
-                               const PetscInt point[2], const PetscReal dz[], const PetscBool modes[],
-                               const PetscBool dofs[], PetscReal dgamma[], PetscReal dU[]);
+PetscErrorCode HycoBodiesDerivatives(HycoROM model, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
+                                     const PetscInt point[2], const PetscReal dz[], const PetscBool modes[],
+                                     const PetscBool dofs[], PetscReal dgamma[], PetscReal dU[]);
 /* Sets the displacements of the surfaces and, after HycoBodiesExpand(), of the unknowns inside in U (by unknown of the
    surface's mesh) without prescribed ones. */
 void HycoBodiesMove(HycoBodiesWork work, const HycoBodiesSurface *surface, PetscReal U[]);
-/* After a solve: a bound of |L~ - L|_W relative to *norm = |L~|_W, from the errors of flexibilities and loads at held-out
-   samples of the bodies; 0 without forces. */
+/* After a solve: a bound of |L~ - L|_W relative to *norm = |L~|_W, from the errors of flexibilities and loads at
+   held-out samples of the bodies; 0 without forces. */
 PetscReal HycoBodiesBound(HycoBodiesWork work, PetscReal *norm);
 /* The body of a place, of the surfaces or, from ns on, inside. */
 PetscInt HycoBodiesAt(HycoSubstructures bodies, PetscInt place);
@@ -421,17 +429,17 @@ PetscInt HycoBodiesGrid(HycoSubstructures bodies, PetscInt k, PetscReal theta[])
 PetscErrorCode HycoBodiesNameMotion(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal L[],
                                     const PetscReal d[], char name[HYCO_LINE]);
 /* After a solve that failed: whether no pressures balance the loads on the rigid motions; name: how the body moves. */
-PetscErrorCode HycoBodiesLifts(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal L[],
-                               char name[HYCO_LINE], PetscBool *lifts);
+PetscErrorCode HycoBodiesLiftOff(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal L[],
+                                 char name[HYCO_LINE], PetscBool *lift_off);
 /* g (p): row k of the contacts times the motions. */
 void HycoBodiesMotionRow(HycoBodiesWork work, PetscInt k, PetscReal g[]);
-/* The residuals at the contacts, recomputed from U and the forces; `stationarity` is that of floating bodies. Returns the
-   largest without the effect of rounding the terms whose sum the displacements are, which judges the solve. */
+/* The residuals at the contacts, recomputed from U and the forces; `stationarity` is that of floating bodies. Returns
+   the largest without the effect of rounding the terms whose sum the displacements are, which judges the solve. */
 PetscReal HycoBodiesMeasure(HycoROM model, HycoKKT *kkt);
 PetscReal HycoBodiesUnbalanced(HycoBodiesWork work);
 /* The same with all of the round-off, as HycoROM's `imbalance`; -1: supports prevent all motions. */
 PetscReal HycoBodiesImbalance(HycoBodiesWork work);
-PetscErrorCode HycoBodiesLoose(HycoBodiesWork work, PetscInt n, const PetscReal Lambda[], PetscBool *loose);
+PetscErrorCode HycoBodiesFreeMotion(HycoBodiesWork work, PetscInt n, const PetscReal Lambda[], PetscBool *loose);
 /* "body NAME in its place", of the bodies that contact alone holds. */
 void HycoBodiesNameFloating(HycoBodiesWork work, HycoScene scene, char name[HYCO_LINE]);
 

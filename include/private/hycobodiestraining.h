@@ -36,7 +36,8 @@ PetscErrorCode HycoBodyPartsFind(HycoFOM fom, const PetscReal mu[], HycoBodyPart
 PetscErrorCode HycoBodyPartsDestroy(HycoBodyParts *parts);
 /* "place: moves body cylinder rigidly; modulus: scales body block; no body needs a sample" */
 PetscErrorCode HycoBodyPartsDescribe(HycoScene scene, const HycoBodyParts *parts, char text[HYCO_LINE]);
-/* Why no model of these bodies can be made, in the words of training; "": it can. The contacts have been found. Collective. */
+/* Why no model of these bodies can be made, in the words of training; "": it can. The contacts have been found.
+   Collective. */
 PetscErrorCode HycoBodyPartsRefuse(HycoFOM fom, const HycoBodyParts *parts, char why[HYCO_LINE]);
 /* The number of parameters that change the shape of some body (of body b; b < 0: of any), and which. */
 PetscInt HycoBodyPartsShapes(const HycoBodyParts *parts, PetscInt b, PetscInt parameter[]);
@@ -146,7 +147,8 @@ PetscErrorCode HycoBodiesCondense(HycoReducer reducer, HycoBodiesFactor *factor,
 PetscErrorCode HycoBodiesLoads(HycoReducer reducer, HycoBodiesFactor *factor);
 /* The values of theta and the bodies' samples there. Collective. */
 PetscErrorCode HycoBodiesSample(HycoReducer reducer, HycoBodiesFactor *factor);
-/* The table of the rigid motions, if the shape of a body that contact alone holds changes; after the samples. Collective. */
+/* The table of the rigid motions, if the shape of a body that contact alone holds changes; after the samples.
+   Collective. */
 PetscErrorCode HycoBodiesTakeMotions(HycoReducer reducer, HycoBodiesFactor *factor);
 /* Raises factor->score by the stresses of the displacements u (n_dof of the part, without prescribed ones) relative to
    the largest in their body. Collective. */
@@ -155,8 +157,8 @@ PetscErrorCode HycoBodiesAddScores(HycoReducer reducer, HycoBodiesFactor *factor
 PetscErrorCode HycoBodiesChooseCells(HycoReducer reducer, HycoBodiesFactor *factor);
 /* The modes, as t->V, and H, a, g. Collective. */
 PetscErrorCode HycoBodiesFields(HycoReducer reducer, HycoSnapshots store, HycoBodiesFactor *factor);
-/* For n loads F: the displacements of the surfaces without contact (ns x n), and the work on the motions (p x n). Bodies
-   without load are not solved. Collective. */
+/* For n loads F: the displacements of the surfaces without contact (ns x n), and the work on the motions (p x n).
+   Bodies without load are not solved. Collective. */
 PetscErrorCode HycoBodiesReduce(HycoSubstructures bodies, HycoBodiesFactor *factor, PetscInt n, const Vec F[],
                                 PetscReal u[], PetscReal work[]);
 /* x = K^-1 F for n loads, with given motions and forces of the contacts z ((p + ns) x n; read on rank 0; NULL: 0).

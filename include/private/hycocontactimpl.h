@@ -45,7 +45,8 @@ PetscErrorCode HycoTiesFind(HycoScene scene, HycoMesh mesh, HycoTies *ties);
 /*
   N_lambda contacts in the order of the scene's contacts, then of the slave's tag. A contact's master point is the sum
   of weight[j] times node master[j], j in master_start[k] .. master_start[k+1] - 1: no node for an obstacle, one of
-  weight 1 for a pair, up to four (of a facet, ascending, weights positive with sum 1) on a surface, any number with sum 1 of a mortar.
+  weight 1 for a pair, up to four (of a facet, ascending, weights positive with sum 1) on a surface, any number with sum
+  1 of a mortar.
 
   On surfaces that a map moves, every slave node is a contact, and HycoPairsMove() searches for its master point on the
   moved nodes. A slave node that faces no master then has no master nodes: its row of B is empty.
@@ -73,8 +74,8 @@ typedef struct {
 } HycoShear;
 enum { HYCO_OPEN, HYCO_STICK, HYCO_SLIP };
 
-/* A contact's side (HycoPairs) is one of those of its node, or HYCO_ONE_SIDE; with a mask of the facets that count, where
-   others face nothing, it is 4 mask + side + 1. */
+/* A contact's side (HycoPairs) is one of those of its node, or HYCO_ONE_SIDE; with a mask of the facets that count,
+   where others face nothing, it is 4 mask + side + 1. */
 enum { HYCO_MASK_BITS = 28 };
 static inline PetscInt HycoSideOf(PetscInt side)
 {
@@ -97,9 +98,9 @@ typedef struct _n_HycoPairs {
                         contact's, else HYCO_ONE_SIDE, as where the scene gives the normal */
   PetscInt *master_start, *master;
   PetscReal *weight;
-  PetscInt
-      room; /* masters of a contact on moved surfaces: most of those of one facet, of mortars as many as were met so
-                     far; 0: none is moved, all masters are final */
+  /* masters of a contact on moved surfaces: most of those of one facet, of mortars as many as were met so far; 0: none
+     is moved, all masters are final */
+  PetscInt room;
   PetscInt place; /* place number (HycoFE) of the nodes at the last search */
   PetscInt n_searches;
   HycoSearch *search;  /* by contact of the scene; NULL where room is 0 */
@@ -111,10 +112,11 @@ typedef struct _n_HycoPairs {
   const HycoSurfaceFacts *facts; /* while the contacts of a rank's slaves are found (borrowed); else NULL */
 } HycoPairs;
 
-/* Finds the contacts of a DM, as HycoFECreate() takes it, on its nodes as drawn. Where no map moves the surfaces they are final, and a slave node without a
-   master is an error. facts: of each contact of the scene, for the contacts of the slaves that this rank owns on its part
-   of the surfaces; what all ranks must decide together is then left to HycoContactsAgree(), and what this rank alone
-   cannot decide is an error. NULL: the DM has the whole surfaces. */
+/* Finds the contacts of a DM, as HycoFECreate() takes it, on its nodes as drawn. Where no map moves the surfaces they
+   are final, and a slave node without a master is an error. facts: of each contact of the scene, for the contacts of
+   the slaves that this rank owns on its part of the surfaces; what all ranks must decide together is then left to
+   HycoContactsSynchronise(), and what this rank alone cannot decide is an error. NULL: the DM has the whole
+   surfaces. */
 PetscErrorCode HycoPairsFind(HycoScene scene, DM dm, const HycoSurfaceFacts facts[], HycoPairs *pairs);
 /* The facts about the surfaces of each contact of the scene (facts: scene->n_contacts). Collective. */
 PetscErrorCode HycoContactsFacts(MPI_Comm comm, HycoScene scene, HycoMesh part, HycoSurfaceFacts facts[]);
@@ -127,11 +129,11 @@ PetscErrorCode HycoContactsCandidates(MPI_Comm comm, HycoFE fe, PetscReal slack,
    leave together. The body of a rigid contact is in no pair: otherwise all of its surface would be on one rank. The
    caller frees them. */
 PetscErrorCode HycoContactsNeighbours(HycoScene scene, HycoMesh mesh, PetscInt *n, PetscInt **pairs);
-/* Whether the contacts that the ranks have found are those of the whole surfaces: each contact of the scene has some, of
-   which not all are without a master, and nodes that must be matched are. If not, the whole surfaces give the contacts
-   or the error. Collective. */
-PetscErrorCode HycoContactsAgree(MPI_Comm comm, HycoScene scene, HycoMesh part, HycoMesh surface,
-                                 const HycoPairs *pairs, PetscBool *agreed);
+/* Whether the contacts that the ranks have found are those of the whole surfaces: each contact of the scene has some,
+   of which not all are without a master, and nodes that must be matched are. If not, the whole surfaces give the
+   contacts or the error. Collective. */
+PetscErrorCode HycoContactsSynchronise(MPI_Comm comm, HycoScene scene, HycoMesh part, HycoMesh surface,
+                                       const HycoPairs *pairs, PetscBool *agreed);
 /* Removes contacts of tied nodes whose masters belong to the same contact: these move with their masters. Fails for
    other tied nodes of contacts. */
 PetscErrorCode HycoPairsDropTied(HycoScene scene, HycoMesh mesh, HycoPairs *pairs);
@@ -210,8 +212,8 @@ typedef struct {
   PetscBool filled; /* HycoContactRows() was called */
 } HycoRows;
 PetscErrorCode HycoRowsDestroy(HycoRows *rows);
-/* The rows at fe's parameters, one for each contact, and D minus the contribution of the fixed unknowns; masters of moved
-   surfaces are searched before. Fails if a row has no free unknown and the prescribed displacements penetrate. */
+/* The rows at fe's parameters, one for each contact, and D minus the contribution of the fixed unknowns; masters of
+   moved surfaces are searched before. Fails if a row has no free unknown and the prescribed displacements penetrate. */
 PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, HycoRows *rows);
 /* The same with tangents: contact k has the rows row[k] .. row[k + 1] - 1, its normal, or its normal and dim - 1
    tangents (unit vectors: tangent, 2 x 3 reals a contact). The gap of a tangent's row is the displacement of the slave
@@ -225,44 +227,45 @@ PetscErrorCode HycoContactCountStill(HycoFE fe, const HycoPairs *pairs, const Pe
 PetscReal HycoContactNoGap(HycoFE fe);
 /* Up to this size a distance between the surfaces as drawn is round-off, and counts as 0. */
 PetscReal HycoContactTouches(HycoFE fe);
-/* share[]: by contact of the scene whose given gap overlaps at every node by more than 1 % of an extent: the least overlap over
-   the extent of its smaller body; else 0. fe: on all nodes of this rank, surface: on those of the contacts; gap: of the pairs,
-   by HycoContactGeometry(). Collective. */
-PetscErrorCode HycoContactBuried(MPI_Comm comm, HycoFE fe, HycoFE surface, const HycoPairs *pairs,
-                                 const PetscReal gap[], PetscReal share[]);
+/* share[]: by contact of the scene whose given gap overlaps at every node by more than 1 % of an extent: the least
+   overlap over the extent of its smaller body; else 0. fe: on all nodes of this rank, surface: on those of the
+   contacts; gap: of the pairs, by HycoContactGeometry(). Collective. */
+PetscErrorCode HycoContactInitialOverlap(MPI_Comm comm, HycoFE fe, HycoFE surface, const HycoPairs *pairs,
+                                         const PetscReal gap[], PetscReal share[]);
 /* Facts about the contacts of a solution u (n_dof), L (pairs->n entries, or by index). */
 typedef struct {
   PetscInt n_facing; /* contacts that may close: slave nodes that face a master, and those at obstacles */
   PetscReal overlap; /* largest initial overlap, the gap negative before any displacement */
   PetscReal sliding; /* largest relative tangential motion of a closed contact, over the size of a facet */
 } HycoContactState;
-/* facet: as HycoContactFacets() gives them, of the contacts that no map moves; NULL: fe's mesh has the whole surfaces. */
+/* facet: as HycoContactFacets() gives them, of the contacts that no map moves; NULL: fe's mesh has the whole
+   surfaces. */
 PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u[], const PetscReal L[],
                                   const PetscInt *index, const PetscReal facet[], HycoContactState *state);
-/* The size of the facets over which the sliding of each contact is measured (pairs->n): the longest edge at the master, or
-   else at the slave; 0: neither has any. */
+/* The size of the facets over which the sliding of each contact is measured (pairs->n): the longest edge at the master,
+   or else at the slave; 0: neither has any. */
 PetscErrorCode HycoContactFacets(HycoFE fe, const HycoPairs *pairs, PetscReal facet[]);
 /*
   Finds the combinations of `motions` that frictionless contact does not prevent because of the surfaces' shape: the
   motion is tangential at every contact, to within the faceting error, to a normal, the slave's surface, the master's,
   or the plane of the given normal. unconstrained: coefficients (n x motions->n, orthonormal) of all of them; names by
   HycoMotionsName() of each. alike: those of the largest set that is tangential in the same sense, which turned normals
-  can release. The caller frees both. wide: on several ranks the surface with all facets around all nodes of fe's mesh, of
-  which node i is node index[i] there (NULL: the same). The results are the same on all ranks. Collective.
+  can release. The caller frees both. wide: on several ranks the surface with all facets around all nodes of fe's mesh,
+  of which node i is node index[i] there (NULL: the same). The results are the same on all ranks. Collective.
 */
 PetscErrorCode HycoFEFindUnconstrained(MPI_Comm comm, HycoFE fe, HycoFE wide, const PetscInt index[], HycoPairs *pairs,
                                        const HycoMotions *motions, PetscInt *n_unconstrained, PetscReal **unconstrained,
                                        PetscInt *n_alike, PetscReal **alike);
 /* The longest edge around each node (n_nodes) of the facets of `group`; 0 where it has none. */
 void HycoSurfaceSizes(HycoFE fe, PetscInt group, PetscReal size[]);
-/* Tributary area (length in 2D, 1 in 1D) of each contact's slave node; 0 if its group is no surface. On an edge it is that of
-   the contact's side, or, where the scene gives the normals (n x 3), of the sides that these leave. */
+/* Tributary area (length in 2D, 1 in 1D) of each contact's slave node; 0 if its group is no surface. On an edge it is
+   that of the contact's side, or, where the scene gives the normals (n x 3), of the sides that these leave. */
 PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], PetscReal area[]);
-/* Fails, on all processes, if a normal that the scene gives points into the slave's body or along its surface: at a slave
-   that faces a master, or, without masters, at all. normal: of the pairs. Collective. */
+/* Fails, on all processes, if a normal that the scene gives points into the slave's body or along its surface: at a
+   slave that faces a master, or, without masters, at all. normal: of the pairs. Collective. */
 PetscErrorCode HycoContactCheckNormals(MPI_Comm comm, HycoFE fe, const HycoPairs *pairs, const PetscReal normal[]);
-/* The pressures of a process's contacts: forces over areas. A node without area, on the axis of an axisymmetric scene with
-   cells of second order, has the mean pressure of itself and the middle of its facet. Collective. */
+/* The pressures of a process's contacts: forces over areas. A node without area, on the axis of an axisymmetric scene
+   with cells of second order, has the mean pressure of itself and the middle of its facet. Collective. */
 PetscErrorCode HycoContactPressures(MPI_Comm comm, HycoFE fe, const HycoPairs *pairs, const PetscReal area[],
                                     const PetscReal lambda[], PetscReal pressure[]);
 /* Whether a quantity is of the part of a contact at the nodes of a group. */
@@ -275,15 +278,15 @@ static inline PetscInt HycoSceneResults(HycoScene scene)
 {
   return scene->n_contacts + scene->n_quantities;
 }
-/* Whether each potential contact (pairs->n) belongs to a quantity of contacts: its slave is of the quantity's contact and
-   group. */
+/* Whether each potential contact (pairs->n) belongs to a quantity of contacts: its slave is of the quantity's contact
+   and group. */
 PetscErrorCode HycoPairsOfQuantity(HycoScene scene, HycoMesh mesh, const HycoPairs *pairs, const HycoQuantity *q,
                                    PetscBool of[]);
 /* Fails if a quantity is of a part without contacts on all processes. Collective. */
 PetscErrorCode HycoPairsCheckQuantities(MPI_Comm comm, HycoScene scene, HycoMesh mesh, const HycoPairs *pairs);
 /* Results (result: HycoSceneResults(); names borrowed from the scene) at fe's mu, from the normals, areas, forces and
-   pressures (pairs->n) of this process's potential contacts; a force of at most `least` counts as zero; without contacts
-   the smallest pressure is PETSC_MAX_REAL. Not collective: the caller adds the processes. */
+   pressures (pairs->n) of this process's potential contacts; a force of at most `least` counts as zero; without
+   contacts the smallest pressure is PETSC_MAX_REAL. Not collective: the caller adds the processes. */
 PetscErrorCode HycoContactResults(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal area[],
                                   const PetscReal lambda[], const PetscReal pressure[], PetscReal least,
                                   HycoContactResult result[]);

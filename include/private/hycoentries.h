@@ -16,7 +16,8 @@ PetscBool HycoEntriesFlatten(char text[]);
 PetscErrorCode HycoEntriesOverride(PetscOptions options, PetscBool method_only);
 /* Fills scene->key and value from scene->options, sorted by key. */
 PetscErrorCode HycoEntriesList(HycoScene scene);
-/* Puts the scene's options of PETSc's solvers into the global ones, which these read, unless they are there; removes them again. */
+/* Puts the scene's options of PETSc's solvers into the global ones, which these read, unless they are there; removes
+   them again. */
 PetscErrorCode HycoEntriesShare(HycoScene scene);
 PetscErrorCode HycoEntriesUnshare(HycoScene scene);
 

@@ -1,6 +1,6 @@
 /*
-  Extensions: folders of extensions/ that register further types. CMake's HYCO_EXTENSIONS names those that are built, and
-  writes the file that calls them.
+  Extensions: folders of extensions/ that register further types. CMake's HYCO_EXTENSIONS names those that are built,
+  and writes the file that calls them.
 */
 #ifndef HYCOEXTENSIONS_H
 #define HYCOEXTENSIONS_H

@@ -142,8 +142,8 @@ PetscErrorCode HycoFECreateSurface(HycoScene scene, DM dm, HycoFE *fe);
 /* On the tables of a file just read (borrowed), before they become a DM: a tie's weights are part of the topology. */
 PetscErrorCode HycoFECreateRead(HycoScene scene, HycoMesh mesh, HycoFE *fe);
 PetscErrorCode HycoFEDestroy(HycoFE *fe);
-/* Before the first HycoFESetParameters(): only the surfaces are needed, at parameters close to each other. Later nodes of no
-   facet, tie or support are where the mesh file has them. */
+/* Before the first HycoFESetParameters(): only the surfaces are needed, at parameters close to each other. Later nodes
+   of no facet, tie or support are where the mesh file has them. */
 PetscErrorCode HycoFEUseSurfaces(HycoFE fe);
 /* Keeps the gradients of the shape functions until the nodes move: for paths, which evaluate the same nodes many
    times. */
@@ -168,7 +168,8 @@ HycoChanges HycoSceneChanges(HycoScene scene, const PetscBool changed[]);
 PetscBool HycoSceneLoadsChange(HycoScene scene, const PetscBool changed[]);
 /* Whether they change the map of a body. */
 PetscBool HycoBodyMoves(const HycoBody *body, const PetscBool changed[]);
-/* Whether they change the values or directions of supports with nodes in a mesh (NULL: of any); moved: they move nodes. */
+/* Whether they change the values or directions of supports with nodes in a mesh (NULL: of any); moved: they move
+   nodes. */
 PetscBool HycoSceneSupportsChange(HycoScene scene, HycoMesh on, const PetscBool changed[], PetscBool moved);
 /* Whether they change F: loads, supports, heat, and what moves or stiffens. */
 PetscBool HycoSceneForcesChange(HycoScene scene, const PetscBool changed[]);
@@ -261,13 +262,14 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M);
 /* Stress of u (n_dof, local order) from the elastic tangents, without the stress of thermal strain, averaged over
    each cell: sigma n_cells x n_sigma. */
 PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[]);
-/* The same in the marked cells (in: NULL: all; 0 in others) for many u and parameters: *kept (the caller's, NULL at first, freed with PetscFree()) has the nodes and the
-   mean gradients of the cells, 6 nv numbers each, so that those of cells whose nodes do not move are computed once. */
-PetscErrorCode HycoFEStressKept(HycoFE fe, const PetscBool in[], const PetscReal u[], PetscReal **kept,
-                                PetscReal sigma[]);
+/* The same in the marked cells (in: NULL: all; 0 in others) for many u and parameters: *kept (the caller's, NULL at
+   first, freed with PetscFree()) has the nodes and the mean gradients of the cells, 6 nv numbers each, so that those of
+   cells whose nodes do not move are computed once. */
+PetscErrorCode HycoFEStressMatrixKept(HycoFE fe, const PetscBool in[], const PetscReal u[], PetscReal **kept,
+                                      PetscReal sigma[]);
 /* slope (n_dof) += factor times the derivative of by . sigma of a cell with respect to the displacements. */
-PetscErrorCode HycoFEAddStressSlope(HycoFE fe, PetscInt cell, const PetscReal by[6], PetscReal factor,
-                                    PetscReal slope[]);
+PetscErrorCode HycoFEAddStressDerivatives(HycoFE fe, PetscInt cell, const PetscReal by[6], PetscReal factor,
+                                          PetscReal slope[]);
 /* The volumes of the cells, of the full circle in an axisymmetric scene. */
 PetscErrorCode HycoFEVolumes(HycoFE fe, PetscReal volume[]);
 /* Adds the nodal forces of body forces to a cell's unknowns (f: nv x dim). */

@@ -60,7 +60,7 @@ typedef struct {
   PetscReal *force, *pressure, *gap_node, *gap, *normal, *area, *pressure_of; /* pressure_of: by contact */
   PetscReal *which; /* by node: the number of the contact whose slave it is, of several the first; NaN: none */
   PetscInt *slave_id;
-  PetscBool rubs;                     /* on every rank: there are fields of friction */
+  PetscBool has_friction;             /* on every rank: there are fields of friction */
   PetscReal *traction, *slip, *state; /* by node: tangential force over area and sum of slips of the slave, 3 each;
                                          HYCO_OPEN, ... */
 } HycoContactFields;
@@ -71,8 +71,8 @@ PetscErrorCode HycoContactFieldsCreate(MPI_Comm comm, HycoFE surface, HycoPairs 
    Collective. */
 PetscErrorCode HycoContactFieldsToPart(MPI_Comm comm, HycoFE fe, HycoMesh surface, HycoContactFields *fields);
 PetscErrorCode HycoContactFieldsDestroy(HycoContactFields *fields);
-/* Writes a value of each contact (MPIU_INT or MPIU_REAL; value: of the process's own) as a dataset in the order of all n
-   contacts. Collective. */
+/* Writes a value of each contact (MPIU_INT or MPIU_REAL; value: of the process's own) as a dataset in the order of all
+   n contacts. Collective. */
 PetscErrorCode HycoContactsWrite(MPI_Comm comm, HycoH5 h, const char name[], const HycoPairs *pairs, PetscInt n,
                                  MPI_Datatype type, const void *value);
 
@@ -125,8 +125,8 @@ PetscErrorCode HycoVTKWriteField(HycoFieldFile file, const HycoField *field, con
                                  char set[HYCO_LINE]);
 PetscErrorCode HycoVTKWriteTimes(HycoFieldFile file);
 
-/* A solution: u on fe, u_surface on the mesh of the pairs. With an order, these are this rank's part, and the contacts of
-   its slaves; order NULL: this process has everything. rid: marks cells, or NULL. Borrowed. */
+/* A solution: u on fe, u_surface on the mesh of the pairs. With an order, these are this rank's part, and the contacts
+   of its slaves; order NULL: this process has everything. rid: marks cells, or NULL. Borrowed. */
 typedef struct {
   const HycoFileOrder *order;
   HycoFE fe, surface;

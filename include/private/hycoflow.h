@@ -42,7 +42,8 @@ extern const HycoFlowRule HycoFlowJ2, HycoFlowNorton, HycoFlowStrainHardening, H
 /* The law at points whose constants are young, poisson and the rule's own; `failed` and `why` are set by the caller. */
 void HycoFlowUpdate(const HycoFlowRule *rule, HycoMaterialPoints *points);
 
-/* In a law's create(): after HycoElasticDeclare() for young and poisson, and its own constants; the rule must be static. */
+/* In a law's create(): after HycoElasticDeclare() for young and poisson, and its own constants; the rule must be
+   static. */
 PetscErrorCode HycoFlowEnd(HycoMaterial material, const HycoFlowRule *rule);
 
 #endif

@@ -49,8 +49,8 @@ struct _p_HycoFOM {
   VecScatter to_local, to_surface;               /* to_surface: NULL on one rank */
   Vec U_local, U_surface;
   HycoFileOrder *rows; /* NULL on one rank, and until it is first used */
-  /* the last solution: displacements at the part's nodes and at the surface's, without released motions; stresses of the
-     part's cells, on request; forces and gaps of the rank's contacts; on rank 0 the forces of all, on request */
+  /* the last solution: displacements at the part's nodes and at the surface's, without released motions; stresses of
+     the part's cells, on request; forces and gaps of the rank's contacts; on rank 0 the forces of all, on request */
   PetscReal *u, *u_surface, *sigma, *lambda, *gap, *lambda_all;
   struct _n_HycoFieldFile *set;      /* HycoFOMWriteBegin() */
   HycoContactResult *contact_result; /* HycoSceneResults(), on request */
@@ -107,9 +107,9 @@ PetscErrorCode HycoFOMSetLambda(HycoFOM fom, const PetscReal lambda[]);
 PetscErrorCode HycoFOMWriteForces(HycoFOM fom, HycoH5 h5, const char name[]);
 /* Updates fe and fe_surface to mu; on several ranks also the masters on moved surfaces. Collective. */
 PetscErrorCode HycoFOMSetParameters(HycoFOM fom, const PetscReal mu[]);
-/* Why the solver would fail with the system just assembled, as no contact forces balance its loads; "": it would not, or with
-   friction. Collective. */
-PetscErrorCode HycoFOMLifts(HycoFOM fom, char why[HYCO_LINE]);
+/* Why the solver would fail with the system just assembled, as no contact forces balance its loads; "": it would not,
+   or with friction. Collective. */
+PetscErrorCode HycoFOMLiftOff(HycoFOM fom, char why[HYCO_LINE]);
 /* K, F, B, D at mu, in the system. Collective. */
 PetscErrorCode HycoFOMAssemble(HycoFOM fom, const PetscReal mu[]);
 /* After a solve: u, u_surface and lambda of U and Lambda. Collective. */
@@ -143,8 +143,8 @@ PetscErrorCode HycoFOMTakeOutReleased(HycoFOM fom, Vec u);
 /* Number of closed contacts of the last solution whose rows of B depend on the others; if it is not 0, the contact
    forces are not unique. Collective. */
 PetscErrorCode HycoFOMCountDependent(HycoFOM fom, PetscInt *dependent);
-/* The same for m rows and their gaps on one process, displacements u (n_dof) and normal forces lambda; slip: of contacts
-   with friction, whose rows have tangents; else NULL: a row for each contact. */
+/* The same for m rows and their gaps on one process, displacements u (n_dof) and normal forces lambda; slip: of
+   contacts with friction, whose rows have tangents; else NULL: a row for each contact. */
 PetscErrorCode HycoRowsCountDependent(const HycoRows *rows, PetscInt n_dof, const PetscReal u[],
                                       const PetscReal lambda[], const HycoSlip *slip, PetscInt *dependent);
 /* Creates distributed vectors of the motions; VecDestroyVecs() destroys them. Collective. */
@@ -156,7 +156,7 @@ PetscErrorCode HycoFOMForgetSoft(HycoFOM fom);
 PetscErrorCode HycoFOMMoveClosed(HycoFOM fom, PetscInt p, const Vec v[], Vec w[], PetscReal *size);
 /* name: a rigid motion, left free by supports and springs, on which no contact force of the solution acts; "": none.
    Collective. */
-PetscErrorCode HycoFOMNameLoose(HycoFOM fom, char name[HYCO_LINE]);
+PetscErrorCode HycoFOMNameFreeMotion(HycoFOM fom, char name[HYCO_LINE]);
 /* Changes the reason of a solution u (of the part's unknowns) whose displacements or energies are impossible.
    relative: the largest displacement, over the extent of the mesh. why: the reason in words, with the body or the
    number that shows it, for the contact forces L (NULL: none); empty if the solution is accepted. Collective. */

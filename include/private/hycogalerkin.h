@@ -115,16 +115,17 @@ PetscErrorCode HycoGalerkinUnpack(HycoROM model);
 PetscErrorCode HycoGalerkinExpand(HycoROM model);
 
 /*
-  Friction on the path (galerkin_friction.c). Create in set-up, after own_pairs; Destroy is NULL-safe. Begin at the start of a path;
-  Rows sets own_rows, Pose the cones of the system, both at fe's parameters of a step; Accept when x and L are those of
-  an accepted step, with U and Lambda set; Show and Record at a listed time, before and after HycoTraceRecord().
+  Friction on the path (galerkin_friction.c). Create in set-up, after own_pairs; Destroy is NULL-safe. Begin at the
+  start of a path; Rows sets own_rows, Pose the cones of the system, both at fe's parameters of a step; Accept when x
+  and L are those of an accepted step, with U and Lambda set; Show and Record at a listed time, before and after
+  HycoTraceRecord().
 */
 struct _n_HycoPath;
 PetscErrorCode HycoGalerkinFrictionCreate(HycoROM model);
 PetscErrorCode HycoGalerkinFrictionDestroy(HycoGalerkinFriction *friction);
 PetscErrorCode HycoGalerkinFrictionBegin(HycoROM model);
 PetscErrorCode HycoGalerkinFrictionRows(HycoROM model);
-PetscErrorCode HycoGalerkinFrictionPose(HycoROM model);
+PetscErrorCode HycoGalerkinFrictionSetCones(HycoROM model);
 PetscErrorCode HycoGalerkinFrictionAccept(HycoROM model, struct _n_HycoPath *path);
 PetscErrorCode HycoGalerkinFrictionShow(HycoROM model);
 PetscErrorCode HycoGalerkinFrictionRecord(HycoROM model, HycoStep *step);

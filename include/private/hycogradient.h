@@ -1,6 +1,6 @@
-/* Derivatives of outputs with respect to the parameters: the data are differentiated by differences along one parameter,
-   the solution by the linear system of its closed contacts; a path by that of each of its steps, where its type has it, else
-   by the paths beside it, in its own steps in time. */
+/* Derivatives of outputs with respect to the parameters: the data are differentiated by differences along one
+   parameter, the solution by the linear system of its closed contacts; a path by that of each of its steps, where its
+   type has it, else by the paths beside it, in its own steps in time. */
 #ifndef HYCOGRADIENT_H
 #define HYCOGRADIENT_H
 
@@ -25,8 +25,8 @@ typedef struct _n_HycoDifference {
   int sign; /* the direction of one-sided derivatives: 1; at the upper end of the range -1 */
 } HycoDifference;
 
-/* Steps as shares of the range: of data, where the error of the central difference is about 1e-9 and that of round-off less;
-   of paths, whose round-off is that of Newton's method. */
+/* Steps as shares of the range: of data, where the error of the central difference is about 1e-9 and that of round-off
+   less; of paths, whose round-off is that of Newton's method. */
 #define HYCO_GRADIENT_STEP      3e-5
 #define HYCO_GRADIENT_CLOSER    2 /* differences of a quarter of the step, where slopes jump */
 #define HYCO_GRADIENT_PATH_STEP 1e-4
@@ -40,8 +40,8 @@ void HycoDifferencePoint(const HycoDifference *difference, HycoScene scene, cons
                          PetscReal at[]);
 /* The same difference with a quarter of its step. */
 void HycoDifferenceShrink(HycoDifference *difference);
-/* By how much the slopes to the two sides differ; 0: by no more than a small share of `slope` (0: of the larger one), or
-   by the round-off of values of this size. */
+/* By how much the slopes to the two sides differ; 0: by no more than a small share of `slope` (0: of the larger one),
+   or by the round-off of values of this size. */
 PetscReal HycoDifferenceJump(const HycoDifference *difference, PetscReal size, PetscReal slope,
                              const PetscReal value[3]);
 /* Whether such a jump is a kink, and not curvature: it stays at a quarter of the step, with the values `closer`. */
@@ -66,13 +66,13 @@ PetscErrorCode HycoGradientColumn(HycoGradient *gradient, HycoGradientStore *sto
 void HycoPathLargest(HycoScene scene, const HycoStep step[], PetscReal most[]);
 /* Tolerance of Newton's method on the paths beside a solution. */
 #define HYCO_GRADIENT_RTOL 1e-12
-/* Solves the path at mu in the steps of the solution, as far as its end, without monitors and files; *step: at its n_times
-   listed times, with the outputs. Borrowed until the next call. */
+/* Solves the path at mu in the steps of the solution, as far as its end, without monitors and files; *step: at its
+   n_times listed times, with the outputs. Borrowed until the next call. */
 typedef PetscErrorCode (*HycoGradientFollow)(void *context, const PetscReal mu[], const HycoStep *step[]);
 /* Fails if such a path did not end, or halved a step. */
-PetscErrorCode HycoPathCheckBeside(PetscBool ended, PetscInt cuts, const char why[]);
-/* Sets the gradient of a path from the paths at the points beside mu. step: n_times, of the solution, read before `follow`
-   is called. As collective as `follow`. */
+PetscErrorCode HycoPathCheckPerturbed(PetscBool ended, PetscInt cuts, const char why[]);
+/* Sets the gradient of a path from the paths at the points beside mu. step: n_times, of the solution, read before
+   `follow` is called. As collective as `follow`. */
 PetscErrorCode HycoGradientOfPath(HycoScene scene, const PetscReal mu[], const HycoStep step[],
                                   HycoGradientStore *store, HycoGradient *gradient, HycoGradientFollow follow,
                                   void *context);

@@ -26,14 +26,15 @@ PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[]);
     if (PetscUnlikely(!(condition))) HycoFailNoModel(__VA_ARGS__);                                                     \
   } while (0)
 
-/* Fails if SIGINT came since HycoInterruptBegin() and its owner wants to end: where work can end without loss, between solves. Not collective. */
+/* Fails if SIGINT came since HycoInterruptBegin() and its owner wants to end: where work can end without loss, between
+   solves. Not collective. */
 PetscErrorCode HycoInterruptCheck(void);
 
 /* Fails for NULL and for an object of another class. Not collective. `classid` is one of HYCO_..._CLASSID. */
 PetscErrorCode HycoHandleCheck(const void *handle, const PetscClassId *classid, const char function[]);
 /* An address that a caller must give. */
 #define HycoCheckGiven(pointer)                                                                                        \
-  PetscCheck((pointer), PETSC_COMM_SELF, PETSC_ERR_ARG_NULL, "%s: the argument " #pointer " is NULL", PETSC_FUNCTION_NAME)
+  PetscCheck((pointer), PETSC_COMM_SELF, PETSC_ERR_ARG_NULL, "%s: argument " #pointer " is NULL", PETSC_FUNCTION_NAME)
 #define HycoCheckHandle(handle, classid) PetscCall(HycoHandleCheck((handle), &(classid), PETSC_FUNCTION_NAME))
 /* Begins a View: checks the object; `viewer` becomes stdout if it is NULL; on an ASCII viewer prints the object's class
    and name, and pushes a tab, which the caller pops; with another viewer returns from the calling function. */
@@ -66,8 +67,8 @@ PetscErrorCode HycoOptionsInherit(PetscObject object, PetscObject from);
     __VA_ARGS__;                                                                                                       \
     PetscFunctionReturn(PETSC_SUCCESS);                                                                                \
   }
-/* Begins a Destroy: returns from the calling function for NULL; checks the object, removes one reference and, unless that
-   was the last, sets `*object` to NULL and returns. */
+/* Begins a Destroy: returns from the calling function for NULL; checks the object, removes one reference and, unless
+   that was the last, sets `*object` to NULL and returns. */
 #define HycoDestroyBegin(object, classid)                                                                              \
   do {                                                                                                                 \
     if (!(object) || !*(object)) PetscFunctionReturn(PETSC_SUCCESS);                                                   \
@@ -101,7 +102,8 @@ PetscErrorCode HycoSendRows(MPI_Comm comm, PetscInt n, const PetscMPIInt to[], s
 
 #if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__) &&                       \
     !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-/* Of a function with loops: four numbers at once where the processor can; without fused operations, so that the bits are those of any other. */
+/* Of a function with loops: four numbers at once where the processor can; without fused operations, so that the bits
+   are those of any other. */
 #define HYCO_FOUR_AT_ONCE __attribute__((target_clones("avx2", "default")))
 #else
 #define HYCO_FOUR_AT_ONCE
@@ -164,12 +166,12 @@ PetscErrorCode HycoLogEvent(HycoEvent event, PetscBool begin);
   } while (0)
 
 /* The seal of a file with these bytes, to be appended to them. */
-#define HYCO_SEAL 24
-void HycoSealMake(const void *data, size_t bytes, unsigned char seal[HYCO_SEAL]);
+#define HYCO_CHECKSUM 24
+void HycoChecksumMake(const void *data, size_t bytes, unsigned char seal[HYCO_CHECKSUM]);
 /* Computes the seal of a file, and its size. */
-PetscErrorCode HycoSealFile(const char path[], size_t *size, unsigned char seal[HYCO_SEAL]);
+PetscErrorCode HycoChecksumFile(const char path[], size_t *size, unsigned char seal[HYCO_CHECKSUM]);
 /* Size of a file, and whether it has a seal; fails if it has one that does not match its bytes. */
-PetscErrorCode HycoSealCheck(const char path[], size_t *size, PetscBool *sealed);
+PetscErrorCode HycoChecksumCheck(const char path[], size_t *size, PetscBool *sealed);
 
 /* The text without the mark of UTF-8 (a byte order mark) with which spreadsheets and editors of Windows begin one. */
 static inline char *HycoSkipMark(char *text)
@@ -205,7 +207,8 @@ PetscErrorCode HycoOptionsForgetTable(void);
    the table. */
 PetscErrorCode HycoDeclareClasses(PetscOptions options);
 void HycoOptionsSetDeclare(PetscErrorCode (*declare)(PetscOptions));
-/* Makes each kind of object that reads options of a prefix of hyco's solvers read the global ones, one after the other (src/package). */
+/* Makes each kind of object that reads options of a prefix of hyco's solvers read the global ones, one after the other
+   (src/package). */
 void HycoOptionsSetProbe(PetscErrorCode (*probe)(const char name[]));
 PetscErrorCode HycoSolversProbe(const char name[]);
 /* Registers the ids of all classes; sets them to 0, after PetscFinalize(); fails before the first. Not collective. */

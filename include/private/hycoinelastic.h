@@ -88,29 +88,29 @@ typedef struct {
 PetscErrorCode HycoFEStep(HycoFE fe, const PetscReal u[], PetscReal t0, PetscReal t1, HycoFEState begin,
                           HycoFEState end, PetscReal f_int[], PetscBool tangent, HycoFEStepReport *report);
 PetscErrorCode HycoFEElasticTangent(HycoFE fe);
-/* Whether a law of fe's cells deforms inelastically at once, as in yielding, under large strains. fe is at the parameters of t.
-   Not collective. */
+/* Whether a law of fe's cells deforms inelastically at once, as in yielding, under large strains. fe is at the
+   parameters of t. Not collective. */
 PetscErrorCode HycoFEYields(HycoFE fe, PetscReal t, PetscBool *yields);
-/* rate[n_cells x points of a cell]: of the equivalent inelastic strain in the state at t, of displacements u, by a step of
-   length dt without strain: of creep, and of no other flow; linear cells are not written. *largest: equivalent inelastic
-   strain of a point. fe is at the parameters of t. The state is not changed. Not collective. */
+/* rate[n_cells x points of a cell]: of the equivalent inelastic strain in the state at t, of displacements u, by a step
+   of length dt without strain: of creep, and of no other flow; linear cells are not written. *largest: equivalent
+   inelastic strain of a point. fe is at the parameters of t. The state is not changed. Not collective. */
 PetscErrorCode HycoFERates(HycoFE fe, const PetscReal u[], PetscReal t, PetscReal dt, HycoFEState state,
                            PetscReal rate[], PetscReal *largest);
 
 /*
-  Steps on known displacements: HycoMarchBegin() from the initial state, with fe (borrowed) at the parameters of the
-  first time; HycoMarchStep() with fe at those of t1, after which `state` is that of t1 and f_int (n_dof) its internal
-  forces, even if the report says that it failed. HycoMarchEnd() also after a failure. Not collective.
+  Steps on known displacements: HycoTimeLoopBegin() from the initial state, with fe (borrowed) at the parameters of the
+  first time; HycoTimeLoopStep() with fe at those of t1, after which `state` is that of t1 and f_int (n_dof) its
+  internal forces, even if the report says that it failed. HycoTimeLoopEnd() also after a failure. Not collective.
 */
 typedef struct {
   HycoFE fe;
   HycoFEState state, end;
   PetscReal *f_int;
-} HycoMarch;
-PetscErrorCode HycoMarchBegin(HycoFE fe, HycoMarch *march);
-PetscErrorCode HycoMarchStep(HycoMarch *march, const PetscReal u[], PetscReal t0, PetscReal t1,
-                             HycoFEStepReport *report);
-PetscErrorCode HycoMarchEnd(HycoMarch *march);
+} HycoTimeLoop;
+PetscErrorCode HycoTimeLoopBegin(HycoFE fe, HycoTimeLoop *march);
+PetscErrorCode HycoTimeLoopStep(HycoTimeLoop *march, const PetscReal u[], PetscReal t0, PetscReal t1,
+                                HycoFEStepReport *report);
+PetscErrorCode HycoTimeLoopEnd(HycoTimeLoop *march);
 
 /* The internal forces of one cell from the state's stresses, the integral of B^T sigma (f: nv x dim, overwritten). */
 PetscErrorCode HycoFEStateForce(HycoFE fe, HycoFEState state, PetscInt cell, PetscReal f[]);
@@ -121,8 +121,8 @@ typedef enum { HYCO_BODIES_ALL, HYCO_BODIES_FLOWING } HycoBodies;
 PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[], PetscReal t0, PetscReal t1,
                                 HycoFEState begin, HycoFEState end, PetscReal f_int[], PetscBool tangent,
                                 HycoFEStepReport *report);
-/* Stresses and energies of the cells with linear laws at u, which do not depend on the past, in the state; stored: their
-   energy, without springs. For a mesh that one process has. */
+/* Stresses and energies of the cells with linear laws at u, which do not depend on the past, in the state; stored:
+   their energy, without springs. For a mesh that one process has. */
 PetscErrorCode HycoFELinearStress(HycoFE fe, const PetscReal u[], HycoFEState state, PetscReal *stored);
 /* The stored energy, and the volume means of stress (n_cells x n_sigma) and von Mises stress (n_cells) at u, without a
    state; *served: false, and nothing is computed, unless all bodies are linear, isotropic and without an axis. */
@@ -130,9 +130,9 @@ PetscErrorCode HycoFELinearFields(HycoFE fe, const PetscReal u[], PetscReal sigm
                                   PetscReal *stored, PetscBool *served);
 
 /*
-  Laws at some integration points, each the number of its cell times the points of a cell plus its own; all in bodies with
-  inelastic laws, whose tangents in fe are the elastic ones. HycoFEPointRows(): B (n_sigma x (nv dim)), so that B u_e is the
-  strain of a point, and its weight. HycoFEInelasticStress(): s = C (eps - thermal eps) - sigma in a state.
+  Laws at some integration points, each the number of its cell times the points of a cell plus its own; all in bodies
+  with inelastic laws, whose tangents in fe are the elastic ones. HycoFEPointRows(): B (n_sigma x (nv dim)), so that B
+  u_e is the strain of a point, and its weight. HycoFEInelasticStress(): s = C (eps - thermal eps) - sigma in a state.
   HycoFEStepPoints(): s of n points (n x n_sigma) in the step from `begin` to strains at t1 (n x n_sigma, with thermal
   strains), the size of the terms of each (n), and its derivative C - C_t (n x n_sigma x n_sigma; NULL: not wanted); no
   state is written. A failure is reported as by HycoFEStep(). Not collective.
@@ -144,13 +144,14 @@ PetscErrorCode HycoFEStepPoints(HycoFE fe, PetscInt n, const PetscInt point[], c
                                 HycoFEStepReport *report);
 
 /*
-  Laws at some points (of bodies whose laws have `slopes`) along known displacements, with the derivatives of their states by
-  n_slopes parameters. HycoFEPointsBegin(): the initial state. HycoFEPointsStep(): from the accepted state to u (n_dof) at
-  t1, at fe's parameters; s and C - C_t as HycoFEStepPoints() (NULL: not wanted). HycoFEPointsBeside(): keeps the data at
-  fe's present parameters, and the strains of u there (NULL: those of the step), as those of point 1 to 4 of a difference;
-  changes false: all is as in the step. HycoFEPointsSlope(): the state's derivative by parameter k, du with displacements (n_dof); ds, dstress:
-  n x n_sigma, or NULL; *smooth: false: a point leaves its yield surface. HycoFEPointsAccept(): the step's state becomes the
-  accepted one. Stress and weights of the step are borrowed. Not collective.
+  Laws at some points (of bodies whose laws have `slopes`) along known displacements, with the derivatives of their
+  states by n_slopes parameters. HycoFEPointsBegin(): the initial state. HycoFEPointsStep(): from the accepted state to
+  u (n_dof) at t1, at fe's parameters; s and C - C_t as HycoFEStepPoints() (NULL: not wanted). HycoFEPointsPerturbed():
+  keeps the data at fe's present parameters, and the strains of u there (NULL: those of the step), as those of point 1
+  to 4 of a difference; changes false: all is as in the step. HycoFEPointsDerivatives(): the state's derivative by
+  parameter k, du with displacements (n_dof); ds, dstress: n x n_sigma, or NULL; *smooth: false: a point leaves its
+  yield surface. HycoFEPointsAccept(): the step's state becomes the accepted one. Stress and weights of the step are
+  borrowed. Not collective.
 */
 typedef struct _n_HycoFEPoints *HycoFEPoints;
 PetscErrorCode HycoFEPointsCreate(HycoFE fe, PetscInt n, const PetscInt point[], PetscInt n_slopes,
@@ -161,14 +162,15 @@ PetscErrorCode HycoFEPointsStep(HycoFEPoints points, const PetscReal u[], PetscR
                                 PetscReal lost[]);
 /* Whether parameters change the laws' data; *strains: also the strains of the same free displacements. */
 PetscBool HycoFEPointsChange(HycoFEPoints points, const PetscBool changed[], PetscBool *strains);
-PetscErrorCode HycoFEPointsBeside(HycoFEPoints points, PetscInt id, PetscBool changes, const PetscReal u[]);
-PetscErrorCode HycoFEPointsSlope(HycoFEPoints points, PetscInt k, const PetscReal weight[3], const PetscInt id[3],
-                                 const PetscReal du[], PetscReal ds[], PetscReal dstress[], PetscBool *smooth);
+PetscErrorCode HycoFEPointsPerturbed(HycoFEPoints points, PetscInt id, PetscBool changes, const PetscReal u[]);
+PetscErrorCode HycoFEPointsDerivatives(HycoFEPoints points, PetscInt k, const PetscReal weight[3], const PetscInt id[3],
+                                       const PetscReal du[], PetscReal ds[], PetscReal dstress[], PetscBool *smooth);
 PetscErrorCode HycoFEPointsAccept(HycoFEPoints points);
 const PetscReal *HycoFEPointsStress(HycoFEPoints points);
 const PetscReal *HycoFEPointsWeights(HycoFEPoints points);
 /* The derivative of the weights (n). */
-void HycoFEPointsWeightSlope(HycoFEPoints points, const PetscReal weight[3], const PetscInt id[3], PetscReal slope[]);
+void HycoFEPointsWeightDerivatives(HycoFEPoints points, const PetscReal weight[3], const PetscInt id[3],
+                                   PetscReal slope[]);
 
 /*
   The linear bodies' contribution to f_int at some nodes, K u minus the force of thermal strains, for repeated

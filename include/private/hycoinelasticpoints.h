@@ -1,6 +1,6 @@
 /* Modes of what inelastic stresses lack of the elastic ones along the training paths, and the integration points that
-   show their coefficients (inelastic_points.c). Rows of the modes are sqrt(w) s of all points, in the file's order of the
-   cells: HycoPointRows() of each cell, n_sigma of each point. */
+   show their coefficients (inelastic_points.c). Rows of the modes are sqrt(w) s of all points, in the file's order of
+   the cells: HycoPointRows() of each cell, n_sigma of each point. */
 #ifndef HYCOINELASTICPOINTS_H
 #define HYCOINELASTICPOINTS_H
 
@@ -18,8 +18,8 @@ PetscErrorCode HycoPointsForces(HycoFE fe, const PetscReal value[], PetscReal fo
 /* The Q-DEIM points of a basis, then those of its rows at the remaining points, and so on: `rounds` times a point for
    each mode, up to the rank; ascending. n: rows of a point. point[]: room for rounds x modes. Collective. */
 PetscErrorCode HycoPointsChoose(const HycoBasis *modes, PetscInt n, PetscInt rounds, PetscInt *count, PetscInt point[]);
-/* The pseudo-inverse of the modes at these points: P, l x rows column major; the modes there (rows x l row major); their
-   smallest singular value. Collective. */
+/* The pseudo-inverse of the modes at these points: P, l x rows column major; the modes there (rows x l row major);
+   their smallest singular value. Collective. */
 PetscErrorCode HycoPointsInverse(const HycoBasis *modes, PetscInt n, PetscInt count, const PetscInt point[],
                                  PetscReal P[], PetscReal there[], PetscReal *smallest);
 

@@ -47,8 +47,8 @@ unsigned long long HycoSetHash(PetscInt n, const PetscBool active[]);
 
 #define HYCO_DEPENDENT 1e-12 /* share of a diagonal entry: a pivot that is no larger is round-off */
 /*
-  Factors the triangle ("L" or "U", by columns) of the symmetric n x n matrix A; *regular: no pivot is round-off beside its
-  diagonal entry, or beside scale[n].
+  Factors the triangle ("L" or "U", by columns) of the symmetric n x n matrix A; *regular: no pivot is round-off beside
+  its diagonal entry, or beside scale[n].
 */
 PetscErrorCode HycoCholesky(const char triangle[], PetscInt n, PetscReal A[], const PetscReal scale[],
                             PetscBool *regular);
@@ -74,8 +74,9 @@ PetscErrorCode HycoConeFactorDestroy(HycoConeFactor *factor);
 void HycoConeFactorForget(HycoConeFactor factor);
 /* The same blocks as of the last solve, where those are gone. Borrowed. */
 void HycoConeFactorSetBlocks(HycoConeFactor factor, const HycoBlocks *blocks);
-/* After a solve with this factor: the sign of the determinant of J at the solution, as HycoLCP's; dz (p + n, k columns), the derivative of the solution where q changes by dq, on the
-   pieces of the laws at the solution. *regular: it has one. */
+/* After a solve with this factor: the sign of the determinant of J at the solution, as HycoLCP's; dz (p + n, k
+   columns), the derivative of the solution where q changes by dq, on the pieces of the laws at the solution. *regular:
+   it has one. */
 PetscErrorCode HycoConeFactorSign(HycoConeFactor factor, PetscInt *sign);
 PetscErrorCode HycoConeFactorTangent(HycoConeFactor factor, PetscInt k, const PetscReal dq[], PetscReal dz[],
                                      PetscBool *regular);
@@ -134,39 +135,40 @@ PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscRea
    tolerance 1e-12. */
 PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank);
 /*
-  Whether forces of the blocks balance a load f on p motions, A r = f with A (p x rows, by columns); if not, r are those that
-  come nearest. Less than `rounding` of f need not be balanced. True where it is not decided, as for laws other than
-  Coulomb's. Not collective.
+  Whether forces of the blocks balance a load f on p motions, A r = f with A (p x rows, by columns); if not, r are those
+  that come nearest. Less than `rounding` of f need not be balanced. True where it is not decided, as for laws other
+  than Coulomb's. Not collective.
 */
 PetscErrorCode HycoBlocksBalance(const HycoBlocks *blocks, PetscInt p, const PetscReal A[], const PetscReal f[],
                                  PetscReal rounding, PetscReal r[], PetscBool *exists);
 /* The same for n contacts without other laws: forces r >= 0. */
 PetscErrorCode HycoNormalsBalance(PetscInt p, PetscInt n, const PetscReal A[], const PetscReal f[], PetscReal rounding,
                                   PetscReal r[], PetscBool *exists);
-/* Where none do: adds normal forces to r, so that f - A r is a motion along which no contact opens: the bodies slide by it. */
+/* Where none do: adds normal forces to r, so that f - A r is a motion along which no contact opens: the bodies slide by
+   it. */
 PetscErrorCode HycoBlocksLeaveSlide(const HycoBlocks *blocks, PetscInt p, const PetscReal A[], const PetscReal f[],
                                     PetscReal r[]);
 /* Whether the law of a block, Coulomb's, has friction: its coefficient is above 0. */
-PetscBool HycoBlockRubs(const HycoBlocks *blocks, PetscInt k);
-/* Of p motions with the rows A (p x rows by columns), those which neither the normal forces of r nor its tangential ones
-   that stick hold: their number, 0 without any force, and the first of them (p). */
-PetscErrorCode HycoBlocksLoose(const HycoBlocks *blocks, PetscInt p, const PetscReal A[], const PetscReal r[],
-                               PetscInt *n, PetscReal first[]);
+PetscBool HycoBlockHasFriction(const HycoBlocks *blocks, PetscInt k);
+/* Of p motions with the rows A (p x rows by columns), those which neither the normal forces of r nor its tangential
+   ones that stick hold: their number, 0 without any force, and the first of them (p). */
+PetscErrorCode HycoBlocksFreeMotions(const HycoBlocks *blocks, PetscInt p, const PetscReal A[], const PetscReal r[],
+                                     PetscInt *n, PetscReal first[]);
 /*
   Coulomb's law: x[p], the change of the p motions after a step with the slacks w and the forces r (by row) along the n
   motions that no force acts on, by which the contacts slip least in the step and no gap becomes negative; move[p]: the
   motions' change in the step. first[p]: one of the n. A as above; w changes by -A^T x. Not collective.
 */
-PetscErrorCode HycoBlocksStay(const HycoBlocks *blocks, PetscInt p, const PetscReal A[], const PetscReal w[],
-                              const PetscReal r[], const PetscReal move[], PetscReal x[], PetscInt *n,
-                              PetscReal first[]);
+PetscErrorCode HycoBlocksLeastSlip(const HycoBlocks *blocks, PetscInt p, const PetscReal A[], const PetscReal w[],
+                                   const PetscReal r[], const PetscReal move[], PetscReal x[], PetscInt *n,
+                                   PetscReal first[]);
 /* Semismooth Newton's method for blocks of any cone, z = P(z - rho w), w = q + M z, from z = (x_pinned, forces). */
 PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *its, HycoLCPStatus *status);
 /*
   After a solve with `lcp`'s cone, of which z is the solution, and w = q + M z (p + n): dz and dw where q changes by dq
-  (overwritten) and the coefficients of friction by dmu, by block. before[n]: the forces before the step, which decide where
-  floating bodies without loads are; size: of gaps and displacements of the contacts. *regular false: the solution has no
-  derivative, as where the contacts do not determine it, or change their states.
+  (overwritten) and the coefficients of friction by dmu, by block. before[n]: the forces before the step, which decide
+  where floating bodies without loads are; size: of gaps and displacements of the contacts. *regular false: the solution
+  has no derivative, as where the contacts do not determine it, or change their states.
 */
 PetscErrorCode HycoConeTangent(const HycoLCP *lcp, const PetscReal before[], const PetscReal z[], const PetscReal w[],
                                PetscReal size, const PetscReal dmu[], PetscReal dq[], PetscReal dz[], PetscReal dw[],
@@ -185,22 +187,23 @@ PetscErrorCode HycoLCPLemke(PetscInt n, const PetscReal M[], const PetscReal q[]
 
 typedef struct _n_HycoTangent *HycoTangent;
 /* Whether a contact is closed or undecided, when its flexibility is not known. */
-PetscBool HycoTangentMayTouch(PetscReal L, PetscReal w, PetscReal size);
+PetscBool HycoTangentMayClose(PetscReal L, PetscReal w, PetscReal size);
 /* Why there is no derivative where the matrix is singular and no contact has a force. */
 #define HYCO_TANGENT_UNPRESSED                                                                                         \
   "no load presses a body here that contact alone holds, so that its position has no derivative; take a point at "     \
   "which it carries a load"
-/* The derivative with p free unknowns x before the n contacts, M as in HycoLCP (read now). rigid: they are rigid motions,
-   without stiffness. A contact of force L and gap w is undecided if both are near zero, the force by the displacement that it causes; where the
-   others do not determine the solution, forces above round-off close it. size: of the gaps or of the displacements of the contacts. *regular: the
-   closed contacts determine their forces; otherwise only HycoTangentDestroy() (NULL-safe) may be called. */
+/* The derivative with p free unknowns x before the n contacts, M as in HycoLCP (read now). rigid: they are rigid
+   motions, without stiffness. A contact of force L and gap w is undecided if both are near zero, the force by the
+   displacement that it causes; where the others do not determine the solution, forces above round-off close it. size:
+   of the gaps or of the displacements of the contacts. *regular: the closed contacts determine their forces; otherwise
+   only HycoTangentDestroy() (NULL-safe) may be called. */
 PetscErrorCode HycoTangentCreate(PetscInt p, PetscBool rigid, PetscInt n, const PetscReal M[], const PetscReal L[],
                                  const PetscReal w[], PetscReal size, HycoTangent *tangent, PetscBool *regular);
 PetscErrorCode HycoTangentDestroy(HycoTangent *tangent);
 /* Undecided contacts whose rows do not depend on closed ones. */
 PetscInt HycoTangentUndecided(HycoTangent tangent);
-/* z' (p + n) where q changes by q' (p + n). *kink: undecided contacts make it one-sided; it is that for a change of q in
-   the direction sign (1 or -1) times q'. */
+/* z' (p + n) where q changes by q' (p + n). *kink: undecided contacts make it one-sided; it is that for a change of q
+   in the direction sign (1 or -1) times q'. */
 PetscErrorCode HycoTangentSolve(HycoTangent tangent, const PetscReal q[], int sign, PetscReal z[], PetscBool *kink);
 
 /* -- problems solved by a Tao -- */

@@ -67,9 +67,10 @@ PetscErrorCode HycoKernelWork(Mat K, Vec x, Vec F, Vec b, PetscReal *share);
 PetscErrorCode HycoMotionAtPins(PetscInt n, const Vec v[], const PetscInt pinned[], PetscReal V[]);
 /* A (p x rows of B, by columns), on every rank: B z of p motions. work: like a vector of B's rows. Collective. */
 PetscErrorCode HycoMotionRows(Mat B, PetscInt p, const Vec z[], Vec work, PetscReal A[]);
-/* w[i], the same on every rank: the work of F on the combination of the n motions v that moves the unknown pinned[i] by 1 and
-   none of the others. It is set to 0 where it is round-off of its terms, or below `least` (of a force on the largest
-   displacement of the motion), unless springs resist the motion. stiffness[n]: theirs; NULL: there are none. Collective. */
+/* w[i], the same on every rank: the work of F on the combination of the n motions v that moves the unknown pinned[i] by
+   1 and none of the others. It is set to 0 where it is round-off of its terms, or below `least` (of a force on the
+   largest displacement of the motion), unless springs resist the motion. stiffness[n]: theirs; NULL: there are none.
+   Collective. */
 PetscErrorCode HycoMotionClean(PetscInt n, const Vec v[], const PetscReal stiffness[], const PetscInt pinned[], Vec F,
                                PetscReal least, PetscReal w[]);
 

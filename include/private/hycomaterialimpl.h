@@ -5,20 +5,21 @@
 #include <hycomaterial.h>
 #include <hycosceneimpl.h>
 
-/* A direction of change of a step's data, and the derivatives of its results along it, by point as in HycoMaterialPoints. */
+/* A direction of change of a step's data, and the derivatives of its results along it, by point as in
+   HycoMaterialPoints. */
 typedef struct {
   const PetscReal *strain, *state0; /* at the step's end; at its begin */
   const PetscReal *const *constant; /* as in HycoMaterialPoints; NULL: these and the temperatures stay */
   const PetscReal *temperature;     /* NULL: stays */
   PetscReal *state, *stress, *lost; /* lost: of what the stress lacks of that of an elastic strain */
-  /* raised over the points: the largest rate of an equivalent stress; that at which points on their yield surface, or at
-     rest, leave it */
+  /* raised over the points: the largest rate of an equivalent stress; that at which points on their yield surface, or
+     at rest, leave it */
   PetscReal rate, apart;
-} HycoMaterialSlope;
+} HycoMaterialDerivative;
 /* After HycoMaterialUpdate() of these points, whose solved equations are kept in `solved` (solved_size bytes each), and
    are there unless `fresh`. */
-typedef PetscErrorCode (*HycoMaterialSlopes)(HycoMaterial material, const HycoMaterialPoints *points, PetscBool fresh,
-                                             void *solved, HycoMaterialSlope *slope);
+typedef PetscErrorCode (*HycoMaterialDerivatives)(HycoMaterial material, const HycoMaterialPoints *points,
+                                                  PetscBool fresh, void *solved, HycoMaterialDerivative *slope);
 
 struct _p_HycoMaterial {
   PETSCHEADER(struct _HycoMaterialOps);
@@ -31,7 +32,7 @@ struct _p_HycoMaterial {
   const char *folder;          /* folder of the scene's relative paths; borrowed */
   HycoExpr temperature;        /* owned by the body; NULL: it has none */
   void *data;
-  HycoMaterialSlopes slopes; /* NULL: the law has no derivatives by its data, or its tangents are not exact */
+  HycoMaterialDerivatives slopes; /* NULL: the law has no derivatives by its data, or its tangents are not exact */
   size_t solved_size;
 };
 

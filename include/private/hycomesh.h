@@ -116,12 +116,12 @@ struct _n_HycoMesh {
   PetscInt *facets;      /* n_facets x nf */
   PetscInt *facet_group; /* index of the group; a facet in two groups occurs twice */
   PetscInt *facet_cell;  /* the cell that it bounds; -1: not in this mesh */
-  PetscInt
-      *facet_side; /* n_facets x nf: the side of its group's edge at the node, as drawn, HYCO_ONE_SIDE or HYCO_NO_SIDE;
-                            NULL until HycoSurfaceSides() */
-  PetscInt
-      *facet_rank; /* n_facets x nf: its place among the facets of its group around the node, by tags; with facet_side,
-                            of groups with edges */
+  /* n_facets x nf: the side of its group's edge at the node, as drawn, HYCO_ONE_SIDE or HYCO_NO_SIDE; NULL until
+     HycoSurfaceSides() */
+  PetscInt *facet_side;
+  /* n_facets x nf: its place among the facets of its group around the node, by tags; with facet_side, of groups with
+     edges */
+  PetscInt *facet_rank;
   PetscInt *facet_point; /* of a submesh: the point of the DM that is a facet without its cell, else -1; or NULL */
   /* cell groups that are no body (regions): cells of group g as CSR over groups */
   PetscInt *group_cell_start, *group_cell;
@@ -229,8 +229,8 @@ static inline PetscInt HycoMeshOwned(HycoMesh m, PetscInt node)
   return !m->node_global || (place >= 0 && place < m->n_owned) ? place : -1;
 }
 
-/* Turns the nodes of a facet of a cell (-1: unknown, kept) so that its normal points out of the cell. Facets of a mesh that
-   was made from a DM are turned; those of one that was read are as in the file. */
+/* Turns the nodes of a facet of a cell (-1: unknown, kept) so that its normal points out of the cell. Facets of a mesh
+   that was made from a DM are turned; those of one that was read are as in the file. */
 void HycoMeshTurnFacet(HycoMesh mesh, PetscInt cell, PetscInt facet[]);
 /* The number of a facet in its cell. */
 PetscInt HycoMeshFacetNumber(HycoMesh mesh, PetscInt facet);
@@ -304,8 +304,8 @@ PetscErrorCode HycoMeshNodeSF(MPI_Comm comm, HycoMesh part, PetscInt n, const Pe
 PetscErrorCode HycoSFBcast(PetscSF sf, MPI_Datatype type, PetscInt width, const void *root, void *leaf);
 PetscErrorCode HycoSFSend(PetscSF sf, MPI_Datatype type, PetscInt width, const void *leaf, void *root);
 
-/* The order of the file: the nodes and cells that a part owns (it owns the cells whose first node it owns) are leaves of
-   star forests, whose roots are the rows of each process, n[] from first[]. */
+/* The order of the file: the nodes and cells that a part owns (it owns the cells whose first node it owns) are leaves
+   of star forests, whose roots are the rows of each process, n[] from first[]. */
 typedef enum { HYCO_ON_NODES, HYCO_ON_CELLS, HYCO_N_PLACES } HycoPlace;
 typedef struct {
   MPI_Comm comm;

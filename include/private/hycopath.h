@@ -56,8 +56,8 @@ typedef struct {
   /* Replaces Newton's method on K, B and the solver: from U and Lambda at t0, with everything assembled at t1, to those
      at t1, `end` and kkt. */
   PetscErrorCode (*iterate)(HycoPath, PetscReal t0, PetscReal t1, HycoStepAttempt *);
-  /* The rates of HycoFERates() in the state at t, `begin` or that of the attempt (`end`): all collective, largest over all
-     ranks. NULL: steps are not chosen by their error. */
+  /* The rates of HycoFERates() in the state at t, `begin` or that of the attempt (`end`): all collective, largest over
+     all ranks. NULL: steps are not chosen by their error. */
   PetscErrorCode (*rates)(HycoPath, PetscReal t, PetscReal dt, HycoFEState state, PetscReal rate[], PetscReal *largest);
   PetscErrorCode (*accept)(HycoPath, const HycoStepAttempt *); /* the attempt becomes the state at t */
   PetscErrorCode (*record)(HycoPath); /* at a listed time, or at the last time reached: sets `now` */
@@ -105,10 +105,11 @@ struct _n_HycoPath {
   PetscBool tangent;       /* K is a tangent, not the elastic stiffness */
   PetscInt kept;           /* number of contact systems solved with this K */
   PetscBool flows;         /* some body's law is inelastic */
-  PetscBool rubs;          /* friction: the contact forces have no potential */
+  PetscBool has_friction;  /* friction: the contact forces have no potential */
   char loose[HYCO_LINE];   /* full order with friction: the first motion that no contact force held; "": none */
   PetscReal loose_at[2];   /* the first and the last time of one */
-  char slides[HYCO_LINE];  /* how a body slides away in a larger step, which halving cannot mend; "": none does */
+  char
+      no_equilibrium[HYCO_LINE]; /* how a body slides away in a larger step, which halving cannot mend; "": none does */
   /* Anderson's acceleration: differences of iterates and residuals, newest last */
   PetscInt n_mixed;
   Vec dU[HYCO_ANDERSON], dG[HYCO_ANDERSON], U_last, G_last, G;
@@ -119,13 +120,13 @@ struct _n_HycoPath {
   PetscBool rates, rated; /* steps have an estimate of their error in time; rate[0] is known */
   PetscReal rated_by;     /* the length of the step that gave rate[0] */
   PetscReal time_error, largest,
-      ahead;     /* sum of the steps' estimates; inelastic strain at t, and of any attempt since the
+      ahead;        /* sum of the steps' estimates; inelastic strain at t, and of any attempt since the
                                            last listed time */
-  PetscInt step; /* number of listed times reached: the index of the next one */
-  HycoKKT kkt;   /* of the last accepted time */
-  HycoStep now;  /* since the last listed time */
-  PetscInt
-      n_bound; /* number of accepted steps that only -hyco_step_inelastic kept from growing, without those before a resumption */
+  PetscInt step;    /* number of listed times reached: the index of the next one */
+  HycoKKT kkt;      /* of the last accepted time */
+  HycoStep now;     /* since the last listed time */
+  PetscInt n_bound; /* number of accepted steps that only -hyco_step_inelastic kept from growing, without those before a
+                  resumption */
   PetscInt n_steps;
   HycoStep *steps;
   PetscReal *orders; /* observed orders of the attempts that have one */
@@ -142,8 +143,8 @@ struct _n_HycoPath {
   PetscErrorCode (*between)(HycoFOM, void *ctx); /* NULL, or called at accepted steps that do not end at a listed
                                                     time */
   void *monitor_ctx;                             /* context of both */
-  PetscBool
-      beside; /* of elastic bodies: stresses and reactions are those of the displacements at hand, beside the path */
+  /* of elastic bodies: stresses and reactions are those of the displacements at hand, beside the path */
+  PetscBool beside;
   PetscErrorCode (*passes)(HycoPath, PetscReal t0, void *ctx); /* NULL, or called after each accepted step, from t0 */
   void *passes_ctx;
   PetscErrorCode (*interrupt)(void *ctx); /* NULL, or called at each iteration; its error ends the path */

@@ -68,8 +68,8 @@ struct _p_HycoReducer {
   PetscInt n_judged;       /* of an attempt, on rank 0: number of predictions at training points (with no solution
                               HYCO_UNSOLVED_WORK each), */
   PetscInt n_unknowns;     /* and of displacements in A that are not fixed */
-  char remedy
-      [HYCO_LINE]; /* of an attempt without an accurate model: what else the user may do, of the type; "": nothing */
+  /* of an attempt without an accurate model: what else the user may do, of the type; "": nothing */
+  char remedy[HYCO_LINE];
   char doing[HYCO_LINE];    /* of the search, for the monitor of phases: the settings of the attempt */
   PetscInt most_full_order; /* hybrid all: largest number of full-order displacements; 0: no limit */
   PetscInt scan;            /* points per parameter; 0: chosen by the library */
@@ -139,7 +139,7 @@ struct _p_HycoReducer {
   PetscReal cpu_solution;      /* HycoTraining */
   PetscReal cpu_begin;         /* of this rank, when the run began */
   PetscReal sliding;           /* of the last run's solutions, */
-  PetscReal time_error;       /* of those that were solved now */
+  PetscReal time_error;        /* of those that were solved now */
   PetscInt unsolved;           /* of the last run, every rank: HycoSnapshotsGetBalance() */
   PetscReal *written;
   PetscReal solving;     /* seconds of its full-order solutions */
@@ -154,7 +154,8 @@ PetscErrorCode HycoReducerTakesCubature(HycoReducer t, PetscBool *takes);
 
 /* The scene's variables of column k of the snapshots: all of mu (HYCO_MAX_PARAMETERS). */
 PetscErrorCode HycoReducerColumn(HycoReducer t, PetscInt k, PetscReal mu[]);
-/* Whether a type needs no training solutions: those of paths have the inelastic strains, from which its modes are made. */
+/* Whether a type needs no training solutions: those of paths have the inelastic strains, from which its modes are
+   made. */
 static inline PetscBool HycoReducerOwnModes(HycoReducer t, const HycoROM type)
 {
   return (PetscBool)(type->model->traits.own_modes && !(t->scene && t->scene->n_times));
@@ -176,8 +177,9 @@ PetscErrorCode HycoTrainerNames(const char *const **names);
 PetscErrorCode HycoTrainerFind(HycoROMType type, HycoTrainerOps *ops);
 PetscErrorCode HycoReducerSetType(HycoReducer t, HycoROMType type);
 /* Empirical cubature (cubature_weights.c): from the left singular vectors W (n_cells x n, rows in the file's order) and
-   singular values of the cells' contributions. The weights of all cells of the whole mesh (w: n_cells, on rank 0; `fixed` in the cells of the part that are `near`,
-   which are in no equation) for the leading vectors, up to a share `tol`; the errors as in the model. Collective. */
+   singular values of the cells' contributions. The weights of all cells of the whole mesh (w: n_cells, on rank 0;
+   `fixed` in the cells of the part that are `near`, which are in no equation) for the leading vectors, up to a share
+   `tol`; the errors as in the model. Collective. */
 PetscErrorCode HycoCubatureFind(HycoReducer reducer, const PetscBool near[], PetscReal fixed, PetscReal tol, Mat W,
                                 PetscInt n, const PetscReal sigma[], PetscReal w[], PetscReal error[2]);
 /* The nonzero dual snapshots (n_contacts x n column major, the caller owns them). Rank 0. */
@@ -221,8 +223,8 @@ PetscErrorCode HycoPathModesAdd(HycoReducer t, Mat path, PetscReal tol, HycoPath
 PetscErrorCode HycoPathModesJoin(HycoReducer t, HycoPathModes *modes, PetscInt N, PetscInt n_rows, PetscReal tol,
                                  PetscInt max_modes, HycoBasis *basis);
 PetscErrorCode HycoPathModesDestroy(HycoPathModes *modes);
-/* contact[]: the nodes of the contacts' surfaces that every model's mesh has, whatever its cells: those of each contact,
-   for moved surfaces all. Rank 0; others are left as they are. */
+/* contact[]: the nodes of the contacts' surfaces that every model's mesh has, whatever its cells: those of each
+   contact, for moved surfaces all. Rank 0; others are left as they are. */
 PetscErrorCode HycoReducerMarkContacts(HycoReducer t, PetscBool contact[]);
 /* The marked cells of the mesh (by cell of the process's part) as a mesh on rank 0; elsewhere NULL. The caller owns it.
    Collective. */
@@ -305,7 +307,7 @@ typedef struct {
   PetscErrorCode (*displacement)(void *ctx, PetscInt k, PetscReal u[]), (*record)(void *ctx, PetscInt k);
   void *ctx;
   PetscReal *u; /* n_dof */
-  HycoMarch march;
+  HycoTimeLoop march;
   PetscInt column;           /* the column of `before`; -1: none */
   PetscReal *before, *after; /* n_dof: displacements at two listed times */
 } HycoTrainingReplay;
@@ -328,7 +330,8 @@ PetscErrorCode HycoReducerCorners(HycoReducer reducer, PetscInt most, HycoSample
 
 /* Result of a model at one held-out point, all PetscReal: errors (those of forces before division), for a path at
    its worst time, and at its end; the norms of forces and stress, whether it converged, the number of its group
-   (calibrate.c), the features of the estimates, the time of some repetitions; 1 if the position of a body is arbitrary, and
+   (calibrate.c), the features of the estimates, the time of some repetitions; 1 if the position of a body is arbitrary,
+   and
   displacements are not judged. */
 #define HYCO_HELD_REPEATS 3
 typedef struct _n_HycoHeldOut {
@@ -338,16 +341,16 @@ typedef struct _n_HycoHeldOut {
 /* By HycoErrorKind, the norm of the error of a prediction, and that of the reference. */
 typedef struct {
   PetscReal lost, size;
-} HycoLost;
+} HycoErrorNorm;
 /* All of these except HYCO_ERROR_U, for the last prediction against a full-order solution: u at the nodes of the
    model's mesh (n_nodes * dim), sigma (n_cells * n_sigma; NULL: not compared) and inelastic (n_cells; NULL) in its
    cells, lambda (n_contacts). */
 PetscErrorCode HycoROMMeasureRID(HycoROM model, const PetscReal u[], const PetscReal sigma[],
-                                 const PetscReal inelastic[], const PetscReal lambda[], HycoLost lost[]);
+                                 const PetscReal inelastic[], const PetscReal lambda[], HycoErrorNorm lost[]);
 /* The errors of a path from those of its n listed times (n x HYCO_N_ERRORS). */
 /* Takes away errors of displacements at a listed time at which the position of a body is arbitrary. */
-void HycoTraceForgive(HycoROM rom, PetscInt step, HycoLost lost[]);
-void HycoPathErrorsJudge(PetscInt n, const HycoLost lost[], HycoPathErrors *errors);
+void HycoTraceExcludeDisplacements(HycoROM rom, PetscInt step, HycoErrorNorm lost[]);
+void HycoPathErrorsJudge(PetscInt n, const HycoErrorNorm lost[], HycoPathErrors *errors);
 
 /* Stops the predictions of held-out paths early: at the first one, in the order of `order`, that does not reach its
    end or has an error whose HycoAttemptsQuotient() is above `most`. */
@@ -358,14 +361,15 @@ typedef struct {
   PetscBool all;                   /* do not stop early */
   PetscInt n;                      /* result: the number of paths predicted, */
   PetscBool lost;                  /* and whether the last of them stopped it */
-} HycoHeldOutRace;
+} HycoHeldOutEarlyStop;
 
 /* Predicts with the last model built at each of n points, whose solutions must be in the store; rows[n] on every
    rank. The ranks share the points, and each compares its rows of the whole mesh. race: for paths; NULL: all points.
    Collective. */
 PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoSamples points, HycoROM model, HycoSnapshots store,
-                                         HycoHeldOutRace *race, HycoHeldOut rows[]);
-/* Judges the model at these corners too, whose rows follow the n held-out ones, and raises the largest errors. Collective. */
+                                         HycoHeldOutEarlyStop *race, HycoHeldOut rows[]);
+/* Judges the model at these corners too, whose rows follow the n held-out ones, and raises the largest errors.
+   Collective. */
 PetscErrorCode HycoReducerJudgeCorners(HycoReducer reducer, HycoSamples corners, PetscInt n, HycoROM model,
                                        HycoSnapshots store, HycoHeldOut rows[], HycoValidation *held_out);
 /* Predicts at a held-out point of the store, a path in the steps of full order. */
@@ -375,8 +379,9 @@ PetscErrorCode HycoHeldOutPredict(HycoROM model, HycoSnapshots store, const Pets
 typedef struct {
   PetscReal error[HYCO_MAX_QUANTITIES], size[HYCO_MAX_QUANTITIES], norm[HYCO_MAX_QUANTITIES];
 } HycoOutputErrors;
-/* Predicts again with the final model at those of n points where rows[] converged, and sets errors[n], zero before, and the rows' features, on rank 0. Nothing if
-   the scene has no outputs. Collective; model, rows and errors are those of rank 0. */
+/* Predicts again with the final model at those of n points where rows[] converged, and sets errors[n], zero before, and
+   the rows' features, on rank 0. Nothing if the scene has no outputs. Collective; model, rows and errors are those of
+   rank 0. */
 PetscErrorCode HycoReducerJudgeOutputs(HycoReducer t, HycoSamples points, HycoROM model, HycoSnapshots store,
                                        HycoHeldOut rows[], HycoOutputErrors errors[]);
 /* The largest 2-norm of contact forces; a relative error, where forces below a tenth of that norm are divided by the
@@ -396,8 +401,8 @@ PetscErrorCode HycoReducerJudgeMeans(HycoReducer t, HycoROM model, PetscReal mos
    far; samples where these were worst come first, and `lost` is set when the mean error of u cannot become smaller,
    or, after some paths, is not smaller so far. best NULL: lost when the mean reaches `most`. judged: all rows,
    unless lost. Rank 0. */
-PetscErrorCode HycoReducerJudgeRace(HycoReducer t, HycoROM model, const HycoJudged best[], PetscReal most,
-                                    HycoJudged judged[], PetscReal *u, PetscBool *lost);
+PetscErrorCode HycoReducerJudgeEarlyStop(HycoReducer t, HycoROM model, const HycoJudged best[], PetscReal most,
+                                         HycoJudged judged[], PetscReal *u, PetscBool *lost);
 /* To the monitor of phases, on rank 0: what is done, `done` of n, in a search with the settings that it tries. */
 PetscErrorCode HycoReducerTell(HycoReducer t, const char what[], PetscInt done, PetscInt n);
 /* After HycoReducerJudge(): which training solutions that model does not reach, and which have the largest errors.
@@ -414,8 +419,8 @@ void HycoReducerGetSettings(HycoReducer t, HycoReducerSettings *settings);
   it (0: none, and the limit is PETSC_INFINITY). HycoAttemptsReopen(): an attempt that was dropped, and may be chosen
   now that others were refused; NULL: none.
 */
-/* Of an error and its target (> 0), at most 1 if it meets it; the largest quotient of a model is above HYCO_MISSES if and
-   only if an error is above its limit (0: it has none). */
+/* Of an error and its target (> 0), at most 1 if it meets it; the largest quotient of a model is above HYCO_MISSES if
+   and only if an error is above its limit (0: it has none). */
 #define HYCO_MISSES 3
 PetscReal HycoAttemptsQuotient(PetscReal target, PetscReal limit, PetscReal error);
 HycoAttempt *HycoAttemptsChoose(PetscInt n, HycoAttempt attempt[]);

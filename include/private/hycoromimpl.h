@@ -47,10 +47,10 @@ typedef struct {
   PetscReal force; /* 2-norm of the largest held-out contact forces: errors of forces below a tenth of it are divided
                       by that tenth */
   PetscInt n_held; /* number of held-out predictions by which the model was judged; 0: none */
-  PetscReal median[HYCO_N_ESTIMATES],
-      largest[HYCO_N_ESTIMATES]; /* their relative errors; very large: not converged, or x/0 */
-  PetscReal cpu;                 /* of the training, processor time; 0: not known (older files) */
-  PetscInt n_outputs;            /* 0: not judged (older files) */
+  /* their relative errors; very large: not converged, or x/0 */
+  PetscReal median[HYCO_N_ESTIMATES], largest[HYCO_N_ESTIMATES];
+  PetscReal cpu;      /* of the training, processor time; 0: not known (older files) */
+  PetscInt n_outputs; /* 0: not judged (older files) */
   HycoOutputEstimate output[HYCO_MAX_QUANTITIES];
 } HycoEstimates;
 
@@ -100,7 +100,7 @@ struct _n_HycoModel {
   PetscReal *points; /* training points, n_points x n_parameters */
   PetscInt n_stops;  /* of a history: times between the listed ones at which steps of predictions end as well, */
   PetscReal *stops, time_error; /* and the largest estimate of full order's error in time: HycoHistory */
-  PetscReal *reach;  /* least, then largest parameter values of the region of training (error_estimate.c); created
+  PetscReal *reach; /* least, then largest parameter values of the region of training (error_estimate.c); created
                         when needed */
   char *provenance;
   char fingerprint[32]; /* of the scene and mesh that it was trained on */
@@ -153,7 +153,8 @@ struct _p_HycoROM {
   HycoFE fe_beyond;             /* on mesh without its cells */
   HycoFE fe_whole;              /* on whole */
   HycoPairs whole_pairs;        /* as `pairs`, on whole */
-  char loose[HYCO_LINE];        /* where prediction.loose is set: "body NAME in its place", or "body NAME from moving along ..." */
+  char loose[HYCO_LINE];        /* where prediction.loose is set: "body NAME in its place", or "body NAME from moving
+                                   along ..." */
   HycoFE fe_floating;           /* on the loaded cells of the bodies that contact alone holds */
   HycoRigid *rigid;             /* their motions at the last prediction, if parameters change them */
   HycoOutputCells output_cells; /* of the scene's quantities */
@@ -171,9 +172,9 @@ struct _p_HycoROM {
   PetscBool whole_current;  /* U_whole is current */
   PetscBool balanced;       /* balance belongs to it */
   PetscReal stretch; /* growth of the errors of what is interpolated, 1 or less inside; the ops `features` sets it */
-  PetscReal
-      imbalance; /* of the forces and moments on the bodies; corrected: before forces were scaled for it; < 0: they are
-                          not compared. Of a path the largest */
+  /* of the forces and moments on the bodies; corrected: before forces were scaled for it; < 0: they are not compared.
+     Of a path the largest */
+  PetscReal imbalance;
   PetscReal corrected;
   PetscReal remainder; /* of (41): the relative difference of the forces in the RID; of a path the largest */
   PetscReal *gamma, *U, *Lambda, *stress, *U_whole;
@@ -189,8 +190,9 @@ PetscErrorCode HycoROMCreate(HycoROM *model);
 PetscErrorCode HycoTraceBegin(HycoROM model);
 PetscErrorCode HycoTraceAdd(HycoROM model, PetscReal t);
 PetscErrorCode HycoTraceList(HycoROM model, PetscReal **sigma, PetscReal **inelastic);
-/* For that listed time, with friction: the state of the contacts. HycoTraceShow(): the model's contacts have the friction
-   of listed time k; call it before their results are evaluated. HycoTraceShowOther(): or this one, which is borrowed. */
+/* For that listed time, with friction: the state of the contacts. HycoTraceShow(): the model's contacts have the
+   friction of listed time k; call it before their results are evaluated. HycoTraceShowOther(): or this one, which is
+   borrowed. */
 PetscErrorCode HycoTraceListShear(HycoROM model, const HycoShear *shear);
 void HycoTraceShow(HycoROM model, PetscInt k);
 void HycoTraceShowOther(HycoROM model, const HycoShear *shear);
@@ -216,7 +218,7 @@ PetscErrorCode HycoTraceWrite(HycoROM model, const char path[]);
 */
 typedef struct {
   HycoROM m; /* borrowed */
-  HycoMarch march;
+  HycoTimeLoop march;
 } HycoReplay;
 PetscErrorCode HycoReplayBegin(HycoROM model, HycoFE fe, HycoReplay *replay);
 PetscErrorCode HycoReplayMove(HycoReplay *replay, PetscInt k);
@@ -252,7 +254,8 @@ PetscErrorCode HycoROMGetDomain(HycoROM model, PetscInt sets[]);
 /* Sets the full-order unknowns (dofs of mesh, any order). */
 PetscErrorCode HycoROMSetFE(HycoROM model, HycoHybrid hybrid, PetscInt n, const PetscInt dof[]);
 
-/* The contacts of a handle: a copy where predictions search for masters, else the model's arrays. Drop frees the copy. */
+/* The contacts of a handle: a copy where predictions search for masters, else the model's arrays. Drop frees the
+   copy. */
 PetscErrorCode HycoROMTakePairs(const HycoPairs *of, HycoPairs *own);
 PetscErrorCode HycoROMDropPairs(HycoPairs *own);
 /* Whether supports of fe hold a displacement of a row of these contacts. */
@@ -280,50 +283,54 @@ PetscErrorCode HycoROMMeasurePath(HycoROM model);
    ownership of all. */
 PetscErrorCode HycoROMSetOutputCells(HycoROM model, HycoMesh mesh, PetscReal V[], PetscBool balanced[],
                                      HycoMesh loaded);
-/* The gradient at the state that the model and its type's problem have, into the arrays of `store` (n_outputs x n_parameters);
-   *regular: false, without a gradient: forces of closed contacts are not unique (fails without a history). */
+/* The gradient at the state that the model and its type's problem have, into the arrays of `store` (n_outputs x
+   n_parameters); *regular: false, without a gradient: forces of closed contacts are not unique (fails without a
+   history). */
 PetscErrorCode HycoROMStateGradient(HycoROM model, HycoGradientStore *store, HycoGradient *gradient,
                                     PetscBool *regular);
 /* The gradient of a predicted path. */
 PetscErrorCode HycoROMPathGradient(HycoROM model, HycoGradient *gradient);
-/* Until HycoROMUnfocusOutputs() the quantities are measured on the cells that decide them near the last prediction, whose
-   quantities are value[], just measured. *focused: they are on cells, not only of contacts. */
+/* Until HycoROMUnfocusOutputs() the quantities are measured on the cells that decide them near the last prediction,
+   whose quantities are value[], just measured. *focused: they are on cells, not only of contacts. */
 PetscErrorCode HycoROMFocusOutputs(HycoROM model, const PetscReal value[], PetscBool *focused);
 PetscErrorCode HycoROMUnfocusOutputs(HycoROM model);
 /* value[n_quantities] without a history, on cells at mu. */
 PetscErrorCode HycoROMMeasureAt(HycoROM model, const PetscReal mu[], PetscReal value[]);
-/* Of focused outputs, of types with the op `beside`: means over cells, facets or nodes are not measured, but known by their
-   slopes at that prediction. The change of these in value[], from[] at the prediction, along `step` times changes of gamma (l)
-   and of U; mu: where prescribed displacements are, NULL: at the prediction. */
+/* Of focused outputs, of types with the op `perturbed`: means over cells, facets or nodes are not measured, but known
+   by their slopes at that prediction. The change of these in value[], from[] at the prediction, along `step` times
+   changes of gamma (l) and of U; mu: where prescribed displacements are, NULL: at the prediction. */
 PetscErrorCode HycoROMChangeMeans(HycoROM model, const PetscReal mu[], const PetscReal from[], PetscReal step,
                                   const PetscReal dgamma[], const PetscReal dU[], PetscReal value[]);
 /* Marks the modes (l) and full-order displacements (dofs of mesh) on which they depend. */
 void HycoROMOutputsRead(HycoROM model, PetscBool modes[], PetscBool dofs[]);
 /* Whether no output needs displacements: results of contacts, and reactions that follow from balance. */
 PetscBool HycoROMOutputsAreForces(HycoROM model);
-/* Whether, with displacements and forces that do not change, the parameters p with changed[p] change the outputs of focused
-   cells: those that are measured, and those known by slopes; held: they
+/* Whether, with displacements and forces that do not change, the parameters p with changed[p] change the outputs of
+   focused cells: those that are measured, and those known by slopes; held: they
    change displacements that supports prescribe to the latter. */
 void HycoROMParametersEnter(HycoROM model, const PetscBool changed[], PetscBool *measured, PetscBool *slopes,
                             PetscBool *held);
 /*
-  The derivatives of the stresses of a path where bodies flow. HycoROMFocusPath(): as HycoROMFocusOutputs() for all listed
-  times, which have been measured, with the laws' points there. HycoROMOutputsStep(): their step to accepted time k, from the
-  first one on; HycoROMOutputsAlong(): then its derivative by the difference's parameter, with those of displacements; *smooth: false: a
-  point leaves its yield surface. HycoROMOutputsMove(): quantities are those of stresses moved so along a parameter.
-  HycoROMOutputsFlow(): there are such stresses. HycoROMOutputsFollow(): all quantities have derivatives so.
+  The derivatives of the stresses of a path where bodies flow. HycoROMFocusPath(): as HycoROMFocusOutputs() for all
+  listed times, which have been measured, with the laws' points there. HycoROMOutputsStep(): their step to accepted time
+  k, from the first one on; HycoROMOutputsSensitivity(): then its derivative by the difference's parameter, with those
+  of displacements; *smooth: false: a point leaves its yield surface. HycoROMOutputsMove(): quantities are those of
+  stresses moved so along a parameter. HycoROMOutputsFlow(): there are such stresses. HycoROMOutputsFollow(): all
+  quantities have derivatives so.
 */
 PetscErrorCode HycoROMFocusPath(HycoROM model, PetscBool *focused);
 PetscBool HycoROMPathIsFocused(HycoROM model);
 PetscErrorCode HycoROMOutputsStep(HycoROM model, PetscInt k);
 struct _n_HycoDifference;
-PetscErrorCode HycoROMOutputsAlong(HycoROM model, const PetscReal mu[], const struct _n_HycoDifference *difference,
-                                   const PetscReal dgamma[], const PetscReal dU[], PetscBool *smooth);
+PetscErrorCode HycoROMOutputsSensitivity(HycoROM model, const PetscReal mu[],
+                                         const struct _n_HycoDifference *difference, const PetscReal dgamma[],
+                                         const PetscReal dU[], PetscBool *smooth);
 void HycoROMOutputsMove(HycoROM model, PetscInt parameter, PetscReal step);
 PetscBool HycoROMOutputsFlow(HycoROM model);
 PetscBool HycoROMOutputsFollow(HycoROM model);
-/* Makes near[] of these n contacts, with the forces of the last prediction. HycoROMExchange(): near[side] takes the place of
-   the model's contacts, which it has until the next call: motions of fe do not move what the prediction left. */
+/* Makes near[] of these n contacts, with the forces of the last prediction. HycoROMExchange(): near[side] takes the
+   place of the model's contacts, which it has until the next call: motions of fe do not move what the prediction
+   left. */
 PetscErrorCode HycoROMMakeNear(HycoROM model, PetscInt n, const PetscInt contact[]);
 void HycoROMExchange(HycoROM model, PetscInt side);
 PetscErrorCode HycoNearDestroy(HycoNear *near);
@@ -332,12 +339,13 @@ HycoFE HycoROMGetOutputCells(HycoROM model);
 /* Of a type with exact displacements beside modes: the share of the contact forces at nodes of cells, of those whose
    stresses the outputs need, that have modes at other nodes; 0: none, another type, or the
    outputs have not been measured. */
-PetscErrorCode HycoROMShareTorn(HycoROM model, PetscReal *share);
-/* The displacements and cell stresses there, of the last HycoROMMeasureQuantities() without a history; NULL as above. */
+PetscErrorCode HycoROMShareDiscontinuous(HycoROM model, PetscReal *share);
+/* The displacements and cell stresses there, of the last HycoROMMeasureQuantities() without a history; NULL as
+   above. */
 void HycoROMGetOutputFields(HycoROM model, const PetscReal *u[], const PetscReal *sigma[]);
 /* The quantities of another solution at the last prediction's parameters, mu[] with the time of a history: u and sigma
-   at the nodes and cells of the output cells (NULL: the model has none), Lambda of all contacts. reaction: for a path the
-   supports' forces at these nodes (NULL: not known, NaN); else not needed. */
+   at the nodes and cells of the output cells (NULL: the model has none), Lambda of all contacts. reaction: for a path
+   the supports' forces at these nodes (NULL: not known, NaN); else not needed. */
 PetscErrorCode HycoROMMeasureSolution(HycoROM model, const PetscReal mu[], const PetscReal u[], const PetscReal sigma[],
                                       const PetscReal reaction[], const PetscReal Lambda[], PetscReal value[]);
 /* Results of each contact of the scene for forces Lambda (of all contacts) at the last prediction's parameters; NULL
@@ -356,8 +364,8 @@ PetscErrorCode HycoROMPushBodies(HycoROM model, const PetscReal Lambda[], const 
   takes ownership of the mesh, after an error too. HycoFloatingMove(): writes it to the model file or reads it.
   HycoFloatingBalance(): at the last prediction's parameters, scales the positive forces in Lambda, each by the
   exponential of a linear combination of its works on the motions, so that the forces' work on each motion is that of
-  the loads; forces that cannot do that stay as they are; raises `imbalance` and `corrected` by what is left and what was
-  before. After HycoROMSetUp(). All are NULL-safe.
+  the loads; forces that cannot do that stay as they are; raises `imbalance` and `corrected` by what is left and what
+  was before. After HycoROMSetUp(). All are NULL-safe.
 */
 PetscErrorCode HycoFloatingCreate(PetscInt n, const HycoRigid rigid[], PetscInt n_bodies, const PetscInt of[],
                                   PetscBool moves, HycoMesh loaded, HycoFloating *floating);

@@ -133,7 +133,8 @@ typedef enum {
   HYCO_QUANTITY_PRESSURE,
   HYCO_QUANTITY_PRESSURE_MIN
 } HycoQuantityKind;
-/* Over the listed times of a path: the least of an output that is a minimum, else the largest; or what `path` states. */
+/* Over the listed times of a path: the least of an output that is a minimum, else the largest; or what `path`
+   states. */
 typedef enum { HYCO_EXTREME_OWN, HYCO_EXTREME_MAX, HYCO_EXTREME_MIN, HYCO_EXTREME_ABSOLUTE } HycoExtreme;
 typedef struct {
   char *name, *group; /* group NULL: all of the mesh */
@@ -184,7 +185,7 @@ enum { HYCO_UNIT_LENGTH, HYCO_UNIT_FORCE, HYCO_UNIT_STRESS, HYCO_N_UNITS };
 
 struct _p_HycoScene {
   PETSCHEADER(int);
-  PetscOptions options;                         /* every entry, those of the command line included */
+  PetscOptions options; /* every entry, those of the command line included */
   PetscBool *shared; /* by entry: an option of PETSc's solvers, which is in the global options while the scene exists */
   char *title, *mesh_path, *unit[HYCO_N_UNITS]; /* units: notes, "" where the scene has none */
   DM dm;                                        /* the mesh of a calling program; NULL: mesh_path */
@@ -248,8 +249,8 @@ PetscBool HycoSceneHasReactions(HycoScene scene);
 /* Whether the quantities need the bodies' fields; the results of contacts. */
 PetscBool HycoSceneHasFieldOutputs(HycoScene scene);
 PetscBool HycoSceneHasContactOutputs(HycoScene scene);
-/* Calls `visit` for each group of the mesh that the scene names, as often as it does, with the entry's key for messages;
-   ends at the first error. Not collective. */
+/* Calls `visit` for each group of the mesh that the scene names, as often as it does, with the entry's key for
+   messages; ends at the first error. Not collective. */
 typedef PetscErrorCode (*HycoGroupVisitor)(const char key[], const char name[], void *context);
 PetscErrorCode HycoSceneVisitGroups(HycoScene scene, HycoGroupVisitor visit, void *context);
 /* Reads the history's entries, once the parameters are read. */

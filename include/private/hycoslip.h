@@ -1,5 +1,5 @@
-/* What friction adds to the contacts of a process, at full order and in a model: their rows, cones and coefficients, and
-   the state that follows from the forces and slips of a step. */
+/* What friction adds to the contacts of a process, at full order and in a model: their rows, cones and coefficients,
+   and the state that follows from the forces and slips of a step. */
 #ifndef HYCOSLIP_H
 #define HYCOSLIP_H
 
@@ -27,12 +27,13 @@ PetscErrorCode HycoSlipBegin(HycoSlip *slip);
 /* The coefficients at the slaves' places, at fe's parameters; fails for a negative one. */
 PetscErrorCode HycoSlipCoefficients(HycoSlip *slip, HycoFE fe, const HycoPairs *pairs);
 /* Whether one of this process is above 0. */
-PetscBool HycoSlipRubs(const HycoSlip *slip);
+PetscBool HycoSlipHasFriction(const HycoSlip *slip);
 /* Adds the slips -w_t of an accepted step, with the forces L and w of all rows. most: the largest displacement. */
 void HycoSlipAdd(HycoSlip *slip, const PetscReal L[], const PetscReal w[], PetscReal most);
 /* The time of an accepted step. */
 void HycoSlipTake(HycoSlip *slip, PetscReal t);
-/* r: forces L of the last accepted time, extrapolated with those before to the time t; false: there are not enough times. */
+/* r: forces L of the last accepted time, extrapolated with those before to the time t; false: there are not enough
+   times. */
 PetscBool HycoSlipExtrapolate(const HycoSlip *slip, PetscReal t, PetscInt n, const PetscReal L[],
                               const PetscReal before[], PetscReal r[]);
 /* L by row, from the normal forces and the vectors (3 n) of friction on the slaves, with the present tangents. */

@@ -22,7 +22,7 @@ struct _p_HycoSnapshots {
   PetscReal cpu;              /* of a solution, mean */
   PetscInt n_timed;           /* of all ranks */
   PetscReal sliding;          /* the largest of all points that were filled: HycoSummary */
-  PetscReal time_error;      /* the same of the paths that were solved: HycoHistory */
+  PetscReal time_error;       /* the same of the paths that were solved: HycoHistory */
   HycoH5 last;                /* the file that was read last, checked and open; or NULL */
   char last_path[PETSC_MAX_PATH_LEN]; /* its name */
   PetscInt n_pieces;                  /* finished pieces of this training that have files, by their keys; rank 0 */
@@ -32,20 +32,21 @@ struct _p_HycoSnapshots {
 /* Fails if an open file is not of this scene and mesh. Not collective. */
 PetscErrorCode HycoSnapshotsCheckFile(HycoSnapshots store, HycoH5 file, const char path[]);
 
-/* A finished piece of a training, up to HYCO_PIECE_ARRAYS arrays; n: of this rank's numbers, 0 on ranks that have none. */
+/* A finished piece of a training, up to HYCO_PIECE_ARRAYS arrays; n: of this rank's numbers, 0 on ranks that have
+   none. */
 #define HYCO_PIECE_ARRAYS 4
 typedef struct {
   PetscInt n;
   PetscReal *value;
 } HycoPieceArray;
 
-/* The key of a piece, continued (start with HYCO_HASH_START); the same key on every rank, from those of all (collective).
-   It must contain all that the piece follows from. */
+/* The key of a piece, continued (start with HYCO_HASH_START); the same key on every rank, from those of all
+   (collective). It must contain all that the piece follows from. */
 unsigned long long HycoPieceAdd(unsigned long long key, size_t bytes, const void *data);
 PetscErrorCode HycoPieceJoin(MPI_Comm comm, unsigned long long *key);
-/* Reads a piece that this or an interrupted training has kept into the arrays, if there is one; keeps one; removes those
-   of this training, once its model is written. The key is that of rank 0. Fails if the folder's pieces are of another
-   scene. Collective; removing is not. */
+/* Reads a piece that this or an interrupted training has kept into the arrays, if there is one; keeps one; removes
+   those of this training, once its model is written. The key is that of rank 0. Fails if the folder's pieces are of
+   another scene. Collective; removing is not. */
 PetscErrorCode HycoSnapshotsFindPiece(HycoSnapshots store, unsigned long long key, PetscInt n,
                                       const HycoPieceArray array[], PetscBool *found);
 PetscErrorCode HycoSnapshotsKeepPiece(HycoSnapshots store, unsigned long long key, PetscInt n,
@@ -70,9 +71,9 @@ extern const char *const HycoSnapshotFriction[HYCO_SNAPSHOT_FRICTION];
   One field of the n samples from `first` on as a dense matrix, with a column per sample, for a scene with a history one
   per listed time of each, sample after sample: "U" (n_nodes x dim unrolled), "lambda" (n_contacts), "sigma" (n_cells x
   n_sigma unrolled), "force" (as U); with a history "inelastic" (n_cells, accumulated) and, if the scene of the first
-  run names one as an output, "reaction" (as U); with friction HycoSnapshotFriction[] (n_contacts). Rows in the mesh file's order,
-  in contiguous blocks over comm; the rows of a node or cell stay on one rank. Collective; the caller owns it. A field
-  without rows gives a matrix of zero rows.
+  run names one as an output, "reaction" (as U); with friction HycoSnapshotFriction[] (n_contacts). Rows in the mesh
+  file's order, in contiguous blocks over comm; the rows of a node or cell stay on one rank. Collective; the caller owns
+  it. A field without rows gives a matrix of zero rows.
 */
 PetscErrorCode HycoSnapshotsGetField(HycoSnapshots store, HycoSamples samples, PetscInt first, PetscInt n,
                                      const char field[], PetscInt block, Mat *S);

@@ -160,7 +160,7 @@ PetscErrorCode HycoSolverAcceptingForm(HycoSolver s, HycoSolverForm stay, HycoSo
 PetscErrorCode HycoSolverNameMethod(HycoSolver s, const char form[]);
 /* With a singular K: whether no contact forces balance the load on its null space; L then has those that come nearest.
    Collective. */
-PetscErrorCode HycoSystemLifts(HycoSystem system, Vec L, PetscBool *lifts);
+PetscErrorCode HycoSystemLiftOff(HycoSystem system, Vec L, PetscBool *lift_off);
 /* Sets x = 0, L = 0 and the reason, for a K that cannot be factored. */
 PetscErrorCode HycoSolverGiveUp(HycoSolver s, Vec x, Vec L);
 /* Whether the chosen Tao type requires a symmetric system. */
@@ -204,26 +204,27 @@ PetscErrorCode HycoSolverSetFree(HycoSolver s, Vec x);
 PetscErrorCode HycoSolverSetRefine(HycoSolver s, PetscBool refine);
 /* The m contacts from which the active set of the next solve starts, with a given flexibility. Borrowed until then. */
 PetscErrorCode HycoSolverSetStartSet(HycoSolver s, const PetscBool active[]);
-/* Passes forces from which the next solve with blocks may start as well as from L: from those with the smaller residual.
-   Borrowed until then. */
+/* Passes forces from which the next solve with blocks may start as well as from L: from those with the smaller
+   residual. Borrowed until then. */
 PetscErrorCode HycoSolverSetOtherStart(HycoSolver s, Vec L);
 /* Sets the largest 2-norm of F - K x - Bt L of the next solve, beside the tolerance; it then starts from the given x.
    0: the tolerance alone. Only iterative solves use it. */
 PetscErrorCode HycoSolverSetTarget(HycoSolver s, PetscReal residual);
 /* Gets the iterations of conjugate gradients in the last solve, and most of one linear solve; 0 with a factor. */
 PetscErrorCode HycoSolverGetLinearIterations(HycoSolver s, PetscInt *its, PetscInt *most);
-/* The matrix of the dual problem after HycoSolverFactor(): S, p + m square, p unknowns pinned before the m contacts. Borrowed. */
+/* The matrix of the dual problem after HycoSolverFactor(): S, p + m square, p unknowns pinned before the m contacts.
+   Borrowed. */
 void HycoSolverGetCondensed(HycoSolver s, PetscInt *m, PetscInt *p, const PetscReal *S[]);
 /* The dense problem of the last solve with the dual form, and its z = (x_pinned, L). Borrowed, without the blocks. */
 void HycoSolverGetDense(HycoSolver s, HycoLCP *lcp, const PetscReal *z[]);
 /*
-  The derivative of the solution x, L of s's system (tangent.c): HycoSolverTangentSolve() gives x' and L' where F - K x -
-  Bt L changes by r, and D - B x by g, at fixed x and L; g and dL are not used without contacts. sign, *kink as in
+  The derivative of the solution x, L of s's system (tangent.c): HycoSolverTangentSolve() gives x' and L' where F - K x
+  - Bt L changes by r, and D - B x by g, at fixed x and L; g and dL are not used without contacts. sign, *kink as in
   HycoTangentSolve(). Needs a factor of K. *regular false: the closed contacts do not determine the solution, and only
-  HycoSolverTangentDestroy() (NULL-safe) may follow. Of a system with blocks x must be that of the last solve, `before` the
-  forces from which it began (else not read), and HycoSolverTangentSolveCones() takes the derivatives of the coefficients too
-  (mu, like L, at normal rows), and gives dw, of D - B x; step: of the differences by which r was found, whose round-off on
-  motions is none; *regular as in HycoConeTangent(). Collective.
+  HycoSolverTangentDestroy() (NULL-safe) may follow. Of a system with blocks x must be that of the last solve, `before`
+  the forces from which it began (else not read), and HycoSolverTangentSolveCones() takes the derivatives of the
+  coefficients too (mu, like L, at normal rows), and gives dw, of D - B x; step: of the differences by which r was
+  found, whose round-off on motions is none; *regular as in HycoConeTangent(). Collective.
 */
 typedef struct _n_HycoSolverTangent *HycoSolverTangent;
 PetscErrorCode HycoSolverTangentCreate(HycoSolver s, Vec x, Vec L, Vec before, HycoSolverTangent *tangent,

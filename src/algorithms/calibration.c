@@ -13,7 +13,7 @@
 /* c >= 0 that minimises |X c - y|^2 about the means, regularised. The ridge is added as p rows; the means are
    removed, since the constant is fitted separately. Exponents must not be negative: an estimate never falls as a
    feature grows. */
-static PetscErrorCode Fit(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], PetscReal c[])
+static PetscErrorCode CalibrationFit(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], PetscReal c[])
 {
   const PetscInt rows = n + p;
   PetscReal *A, *b, mean = 0, residual;
@@ -59,7 +59,8 @@ static PetscReal ToleranceFactor(PetscInt n, PetscReal share)
 
 /* The limit that `share` of values like these n do not exceed. Among few values the quantile is their largest, which
    later ones exceed too often: the tolerance limit then counts, too. */
-static PetscErrorCode Limit(PetscInt n, PetscInt independent, PetscReal value[], PetscReal share, PetscReal *limit)
+static PetscErrorCode CalibrationLimit(PetscInt n, PetscInt independent, PetscReal value[], PetscReal share,
+                                       PetscReal *limit)
 {
   PetscReal mean = 0, square = 0;
 
@@ -76,7 +77,7 @@ static PetscErrorCode Limit(PetscInt n, PetscInt independent, PetscReal value[],
 }
 
 /* y minus the formula without its constant. */
-static PetscReal Above(PetscInt p, const PetscReal X[], PetscReal y, const PetscReal c[])
+static PetscReal CalibrationExcess(PetscInt p, const PetscReal X[], PetscReal y, const PetscReal c[])
 {
   for (PetscInt j = 0; j < p; j++) y -= c[j] * X[j];
   return y;
@@ -106,8 +107,8 @@ PetscErrorCode HycoRaiseBound(PetscInt n, const PetscInt group[], PetscInt p, co
   PetscFunctionBegin;
   PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_PLIB, "there is nothing to bound");
   PetscCall(PetscMalloc1(n, &above));
-  for (PetscInt i = 0; i < n; i++) above[i] = Above(p, X + i * p, y[i], c);
-  PetscCall(Limit(n, CountGroups(n, group), above, share, &c[p]));
+  for (PetscInt i = 0; i < n; i++) above[i] = CalibrationExcess(p, X + i * p, y[i], c);
+  PetscCall(CalibrationLimit(n, CountGroups(n, group), above, share, &c[p]));
   PetscCall(PetscFree(above));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -115,8 +116,8 @@ PetscErrorCode HycoRaiseBound(PetscInt n, const PetscInt group[], PetscInt p, co
 /* above[]: by row, y minus the formula; on return y minus the formula that is fitted without the rows of its group,
    because a formula follows the rows to which it was fitted more closely than others. A row far from all others alone
    determines the formula there: its difference is raised by LEVERAGE at most. */
-static PetscErrorCode LeaveOut(PetscInt n, PetscInt telling, const PetscInt group[], PetscInt p, const PetscReal X[],
-                               const PetscReal y[], PetscReal above[])
+static PetscErrorCode LeaveOut(PetscInt n, PetscInt explanatory, const PetscInt group[], PetscInt p,
+                               const PetscReal X[], const PetscReal y[], PetscReal above[])
 {
   PetscReal *rest, *z, *c;
 
@@ -125,14 +126,14 @@ static PetscErrorCode LeaveOut(PetscInt n, PetscInt telling, const PetscInt grou
   for (PetscInt i = 0; i < n; i++) {
     PetscInt kept = 0;
 
-    for (PetscInt k = 0; k < telling; k++) {
+    for (PetscInt k = 0; k < explanatory; k++) {
       if (group[k] == group[i]) continue;
       PetscCall(PetscArraycpy(rest + kept * p, X + k * p, p));
       z[kept++] = y[k];
     }
     PetscCall(PetscArrayzero(c, p));
-    if (kept) PetscCall(Fit(kept, p, rest, z, c));
-    above[i] = PetscMin(Above(p, X + i * p, y[i], c), above[i] + LEVERAGE);
+    if (kept) PetscCall(CalibrationFit(kept, p, rest, z, c));
+    above[i] = PetscMin(CalibrationExcess(p, X + i * p, y[i], c), above[i] + LEVERAGE);
   }
   PetscCall(PetscFree3(rest, z, c));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -141,18 +142,18 @@ static PetscErrorCode LeaveOut(PetscInt n, PetscInt telling, const PetscInt grou
 /* Exponents c[0 .. p) from the first `telling` rows, and the constant c[p] from all n rows, judged by fits without each
    row's group. Share of values below: `share`. Rows beyond `telling` have errors of round-off, which say nothing of the
    exponents. */
-PetscErrorCode HycoUpperBound(PetscInt n, PetscInt telling, const PetscInt group[], PetscInt p, const PetscReal X[],
+PetscErrorCode HycoUpperBound(PetscInt n, PetscInt explanatory, const PetscInt group[], PetscInt p, const PetscReal X[],
                               const PetscReal y[], PetscReal share, PetscReal c[])
 {
   PetscReal *above;
 
   PetscFunctionBegin;
   PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_PLIB, "there is nothing to bound");
-  PetscCall(Fit(telling, p, X, y, c));
+  PetscCall(CalibrationFit(explanatory, p, X, y, c));
   PetscCall(PetscMalloc1(n, &above));
-  for (PetscInt i = 0; i < n; i++) above[i] = Above(p, X + i * p, y[i], c);
-  PetscCall(LeaveOut(n, telling, group, p, X, y, above));
-  PetscCall(Limit(n, CountGroups(n, group), above, share, &c[p]));
+  for (PetscInt i = 0; i < n; i++) above[i] = CalibrationExcess(p, X + i * p, y[i], c);
+  PetscCall(LeaveOut(n, explanatory, group, p, X, y, above));
+  PetscCall(CalibrationLimit(n, CountGroups(n, group), above, share, &c[p]));
   PetscCall(PetscFree(above));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -26,7 +26,7 @@ PetscErrorCode HycoGatherRows(Mat V, PetscInt n, const PetscInt rows[], PetscRea
 
 /* c: V[index[0..k), 0..k) c = V[index[0..k), k]. Row-wise storage of `rows`, column-wise for LAPACK. Regular in exact
    arithmetic, as each row was chosen where the residual is not zero. */
-static PetscErrorCode Interpolate(PetscInt k, PetscInt l, const PetscReal rows[], PetscReal c[])
+static PetscErrorCode DEIMInterpolate(PetscInt k, PetscInt l, const PetscReal rows[], PetscReal c[])
 {
   PetscReal *A;
   PetscBLASInt kb, one = 1, info, *ipiv;
@@ -64,7 +64,7 @@ PetscErrorCode HycoDEIM(Mat V, PetscInt index[])
     PetscInt at = PETSC_MAX_INT;
 
     /* On every rank alike, from the rows that all have gathered. */
-    if (k) PetscCall(Interpolate(k, l, rows, c));
+    if (k) PetscCall(DEIMInterpolate(k, l, rows, c));
     PetscCall(MatDenseGetArrayRead(V, &v));
     for (PetscInt i = 0; i < hi - lo; i++) {
       r[i] = v[(size_t)k * (size_t)lda + (size_t)i];

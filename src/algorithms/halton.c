@@ -2,7 +2,7 @@
 #include <hycoalgorithms.h>
 
 /* The j-th prime, from 0. */
-static PetscInt Prime(PetscInt j)
+static PetscInt HaltonPrime(PetscInt j)
 {
   PetscInt n = 2;
 
@@ -17,7 +17,7 @@ static PetscInt Prime(PetscInt j)
 /* Entry j of the k-th point, in [0, 1): the digits of k in the j-th prime base, mirrored. */
 PetscReal HycoHalton(PetscInt k, PetscInt j)
 {
-  const PetscInt base = Prime(j);
+  const PetscInt base = HaltonPrime(j);
   PetscReal value = 0, share = 1;
 
   for (; k > 0; k /= base) {

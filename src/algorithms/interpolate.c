@@ -42,7 +42,7 @@ static PetscErrorCode KeepDifferent(HycoInterpolant it, const PetscReal points[]
 
 /* To [0, 1]; a parameter with one value keeps the width 1. Simplices of parameters of different units would be
    arbitrarily flat otherwise. */
-static PetscErrorCode Scale(HycoInterpolant it, const PetscReal points[])
+static PetscErrorCode InterpolateScale(HycoInterpolant it, const PetscReal points[])
 {
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(it->n * it->dim, &it->x));
@@ -62,7 +62,7 @@ static PetscErrorCode Scale(HycoInterpolant it, const PetscReal points[])
 }
 
 /* Position of x on an axis: value[i] <= x <= value[i + 1] and the weight of i + 1; outside, that of the end. */
-static PetscInt Place(PetscInt n, const PetscReal value[], PetscReal x, PetscReal *t)
+static PetscInt AxisPosition(PetscInt n, const PetscReal value[], PetscReal x, PetscReal *t)
 {
   PetscInt i = 0;
 
@@ -100,7 +100,7 @@ static PetscErrorCode FindGrid(HycoInterpolant it)
 
     for (PetscInt p = 0; p < it->dim; p++) {
       PetscReal t;
-      const PetscInt i = Place(it->count[p], it->axis[p], it->x[k * it->dim + p], &t);
+      const PetscInt i = AxisPosition(it->count[p], it->axis[p], it->x[k * it->dim + p], &t);
 
       /* The value is a node of the axis, so that t is 0 or 1. */
       node = node * it->count[p] + i + (t > 0.5);
@@ -165,7 +165,7 @@ static PetscErrorCode TakeSimplices(HycoInterpolant it, qhT *qh)
 
 /* Exact points are on a lower hull in one more dimension; Qhull's messages go into memory, since the library does
    not print. */
-static PetscErrorCode Triangulate(HycoInterpolant it)
+static PetscErrorCode InterpolateTriangulate(HycoInterpolant it)
 {
   static char options[] = "qhull d Qbb Qc Qz Q12 Qt"; /* Delaunay, with points on a common circle triangulated */
   qhT qh;
@@ -208,9 +208,9 @@ PetscErrorCode HycoInterpolantCreate(PetscInt dim, PetscInt n, const PetscReal p
   it->n_given = n;
   PetscCall(PetscMalloc3(n, &it->own, dim, &it->lo, dim, &it->width));
   PetscCall(KeepDifferent(it, points));
-  PetscCall(Scale(it, points));
+  PetscCall(InterpolateScale(it, points));
   PetscCall(FindGrid(it));
-  if (!it->at) PetscCall(Triangulate(it));
+  if (!it->at) PetscCall(InterpolateTriangulate(it));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -239,7 +239,7 @@ static void GridWeights(HycoInterpolant it, const PetscReal x[], PetscReal weigh
   PetscInt free[HYCO_INTERPOLANT_MAX_DIM], n_free = 0;
 
   for (PetscInt p = 0; p < it->dim; p++) {
-    place[p] = Place(it->count[p], it->axis[p], x[p], &t[p]);
+    place[p] = AxisPosition(it->count[p], it->axis[p], x[p], &t[p]);
     /* The upper node of an interval is the lower one of the next, also at the end of the axis. */
     if (t[p] == 1) {
       place[p]++;

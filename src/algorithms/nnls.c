@@ -10,7 +10,7 @@ typedef struct {
 
 /* Appends column j of A by modified Gram-Schmidt, twice; false if it depends on the present ones. Dependent: less than
    1e-12 of its length remains. f->y is Q^T b, so that the solution on the set is one back substitution. */
-static PetscBool Append(Passive *f, const PetscReal A[], const PetscReal b[], PetscInt j)
+static PetscBool NNLSAppend(Passive *f, const PetscReal A[], const PetscReal b[], PetscInt j)
 {
   const PetscInt m = f->m, k = f->k;
   PetscReal *q = f->Q + (size_t)k * (size_t)m, *r = f->R + (size_t)k * (size_t)f->n, before = 0, after = 0;
@@ -87,7 +87,7 @@ static PetscBool MoveTowards(Passive *f, const PetscReal A[], const PetscReal b[
   for (PetscInt j = 0; j < k; j++) {
     const PetscInt column = f->p[j];
 
-    if (x[column] > 0 && Append(f, A, b, column)) continue;
+    if (x[column] > 0 && NNLSAppend(f, A, b, column)) continue;
     x[column] = 0;
     passive[column] = PETSC_FALSE;
   }
@@ -97,7 +97,7 @@ static PetscBool MoveTowards(Passive *f, const PetscReal A[], const PetscReal b[
 #define TIE 1e-8 /* gradients with a smaller relative difference count as equal: the first column is taken */
 
 /* r = b - A x = b - Q Q^T b, and the gradient w = A^T r. */
-static void Gradient(const Passive *f, const PetscReal A[], const PetscReal b[], PetscReal r[], PetscReal w[])
+static void NNLSGradient(const Passive *f, const PetscReal A[], const PetscReal b[], PetscReal r[], PetscReal w[])
 {
   for (PetscInt i = 0; i < f->m; i++) r[i] = b[i];
   for (PetscInt c = 0; c < f->k; c++) {
@@ -142,7 +142,7 @@ PetscErrorCode HycoNNLSMonitored(PetscInt m, PetscInt n, const PetscReal A[], co
   PetscCall(PetscMalloc3(m, &r, n, &w, n + 1, &z));
   PetscCall(PetscCalloc2(n, &passive, n, &banned));
   PetscCall(PetscArrayzero(x, n));
-  Gradient(&f, A, b, r, w);
+  NNLSGradient(&f, A, b, r, w);
   /* Gradients below round-off of the first one are zero. */
   for (PetscInt j = 0; j < n; j++) tol = PetscMax(tol, 1e-12 * PetscAbsReal(w[j]));
   /* Lawson and Hanson's limit: the method is finite, but round-off could make it cycle. */
@@ -154,7 +154,7 @@ PetscErrorCode HycoNNLSMonitored(PetscInt m, PetscInt n, const PetscReal A[], co
     }
     if (best < 0) break;
     banned[best] = PETSC_TRUE; /* until the set changes */
-    if (!Append(&f, A, b, best)) continue;
+    if (!NNLSAppend(&f, A, b, best)) continue;
     BackSolve(&f, z);
     if (z[f.k - 1] <= 0) { /* not a descent direction */
       f.k--;
@@ -164,7 +164,7 @@ PetscErrorCode HycoNNLSMonitored(PetscInt m, PetscInt n, const PetscReal A[], co
     /* Lawson and Hanson's inner loop, which ends because each round removes a column. */
     while (!MoveTowards(&f, A, b, z, x, passive)) BackSolve(&f, z);
     PetscCall(PetscArrayzero(banned, n));
-    Gradient(&f, A, b, r, w);
+    NNLSGradient(&f, A, b, r, w);
     if (monitor) PetscCall((*monitor)(ctx, f.k, most));
   }
   /* r is that of the last gradient, thus of the present x. */

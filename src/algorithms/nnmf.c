@@ -12,8 +12,8 @@
 #define ROUND_OFF 1e-14 /* norm of a gradient due to round-off, S scaled to norm 1 */
 
 /* C = op(A) op(B), m x n with inner dimension k, column major, contiguous. */
-static PetscErrorCode Product(const char transpose[2], PetscInt m, PetscInt n, PetscInt k, const PetscReal A[],
-                              const PetscReal B[], PetscReal C[])
+static PetscErrorCode NNMFProduct(const char transpose[2], PetscInt m, PetscInt n, PetscInt k, const PetscReal A[],
+                                  const PetscReal B[], PetscReal C[])
 {
   PetscBLASInt mb, nb, kb, lda, ldb;
   const PetscReal one = 1, zero = 0;
@@ -48,17 +48,17 @@ static PetscReal ProjectedNorm(PetscInt n, const PetscReal gradient[], const Pet
 
 /* Of |S - W H|^2 / 2 in one factor: (W^T W) H - W^T S. Both products are made once for a half step, so that an
    inner iteration costs k^2 n. */
-static PetscErrorCode Gradient(const Half *h, const PetscReal X[])
+static PetscErrorCode NNMFGradient(const Half *h, const PetscReal X[])
 {
   PetscFunctionBegin;
-  PetscCall(Product("NN", h->k, h->n, h->k, h->G, X, h->gradient));
+  PetscCall(NNMFProduct("NN", h->k, h->n, h->k, h->G, X, h->gradient));
   for (PetscInt i = 0; i < h->k * h->n; i++) h->gradient[i] -= h->C[i];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* step = [X - alpha gradient]_+ - X; whether the decrease is at least a hundredth of the linear prediction. The condition
-   is that of Lin (2007), which needs no value of the function. */
-static PetscErrorCode Try(const Half *h, const PetscReal X[], PetscReal alpha, PetscBool *enough)
+/* step = [X - alpha gradient]_+ - X; whether the decrease is at least a hundredth of the linear prediction. The
+   condition is that of Lin (2007), which needs no value of the function. */
+static PetscErrorCode NNMFTry(const Half *h, const PetscReal X[], PetscReal alpha, PetscBool *enough)
 {
   const PetscBLASInt one = 1;
   PetscBLASInt size;
@@ -68,7 +68,7 @@ static PetscErrorCode Try(const Half *h, const PetscReal X[], PetscReal alpha, P
   PetscCall(PetscBLASIntCast(h->k * h->n, &size));
   for (PetscInt i = 0; i < size; i++) h->step[i] = PetscMax(X[i] - alpha * h->gradient[i], 0) - X[i];
   slope = BLASdot_(&size, h->gradient, &one, h->step, &one);
-  PetscCall(Product("NN", h->k, h->n, h->k, h->G, h->step, h->Gstep));
+  PetscCall(NNMFProduct("NN", h->k, h->n, h->k, h->G, h->step, h->Gstep));
   curve = BLASdot_(&size, h->Gstep, &one, h->step, &one);
   *enough = (PetscBool)(0.99 * slope + 0.5 * curve <= 0);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -86,11 +86,11 @@ static PetscErrorCode SolveHalf(const Half *h, PetscReal tol, PetscReal X[], Pet
     PetscBool enough = PETSC_FALSE, shrink = PETSC_FALSE, done = PETSC_FALSE;
     PetscReal kept = 0;
 
-    PetscCall(Gradient(h, X));
+    PetscCall(NNMFGradient(h, X));
     if (!(ProjectedNorm(n, h->gradient, X) > tol)) break;
     for (PetscInt t = 0; t < STEPS && !done; t++) { /* shorter until the decrease is sufficient, or longer as long as
                                                        it is */
-      PetscCall(Try(h, X, alpha, &enough));
+      PetscCall(NNMFTry(h, X, alpha, &enough));
       if (t == 0) shrink = (PetscBool)!enough;
       if (enough) kept = alpha;
       done = (PetscBool)(enough == shrink);
@@ -121,7 +121,7 @@ static PetscReal LargerPart(PetscInt m, const PetscReal u[], PetscInt n, const P
 
 /* NNDSVD of S: Wt (k x m) and H (k x n). Columns beyond the numerical rank of S are zero and stay zero. Boutsidis and
    Gallopoulos (2008): deterministic, so that training is repeatable. */
-static PetscErrorCode Start(PetscInt m, PetscInt n, const PetscReal S[], PetscInt k, PetscReal Wt[], PetscReal H[])
+static PetscErrorCode NNMFStart(PetscInt m, PetscInt n, const PetscReal S[], PetscInt k, PetscReal Wt[], PetscReal H[])
 {
   const PetscInt r = PetscMin(m, n);
   PetscReal *A, *s, *U, *Vt, *work;
@@ -165,16 +165,16 @@ static PetscErrorCode SetHalf(PetscInt m, PetscInt n, PetscInt k, const PetscRea
   PetscFunctionBegin;
   h->k = k;
   h->n = of_W ? m : n;
-  PetscCall(Product("NT", k, k, of_W ? n : m, other, other, G));
-  PetscCall(Product(of_W ? "NT" : "NN", k, h->n, of_W ? n : m, other, S, C));
+  PetscCall(NNMFProduct("NT", k, k, of_W ? n : m, other, other, G));
+  PetscCall(NNMFProduct(of_W ? "NT" : "NN", k, h->n, of_W ? n : m, other, S, C));
   h->G = G;
   h->C = C;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Each half is solved only as accurately as the other needs: its tolerance drops when it has nothing to do. */
-static PetscErrorCode Alternate(PetscInt m, PetscInt n, PetscInt k, const PetscReal S[], PetscInt max_its,
-                                PetscReal Wt[], PetscReal H[], PetscReal room[])
+static PetscErrorCode NNMFAlternate(PetscInt m, PetscInt n, PetscInt k, const PetscReal S[], PetscInt max_its,
+                                    PetscReal Wt[], PetscReal H[], PetscReal room[])
 {
   const PetscInt size = k * PetscMax(m, n);
   PetscReal *factor[2] = {Wt, H}, *G = room, *C = G + k * k, tol[2], first = 0;
@@ -187,7 +187,7 @@ static PetscErrorCode Alternate(PetscInt m, PetscInt n, PetscInt k, const PetscR
 
     for (PetscInt f = 0; f < 2; f++) {
       PetscCall(SetHalf(m, n, k, S, (PetscBool)(f == 0), factor[1 - f], G, C, &h));
-      PetscCall(Gradient(&h, factor[f]));
+      PetscCall(NNMFGradient(&h, factor[f]));
       norm[f] = ProjectedNorm(k * h.n, h.gradient, factor[f]);
     }
     if (it == 0) {
@@ -205,14 +205,14 @@ static PetscErrorCode Alternate(PetscInt m, PetscInt n, PetscInt k, const PetscR
 }
 
 /* |S - Wt^T H|^2 / |S|^2 for the scaled S, whose norm is 1. From the factors, not from the halves' values. */
-static PetscErrorCode Misfit(PetscInt m, PetscInt n, PetscInt k, const PetscReal S[], const PetscReal Wt[],
-                             const PetscReal H[], PetscReal *misfit)
+static PetscErrorCode NNMFMisfit(PetscInt m, PetscInt n, PetscInt k, const PetscReal S[], const PetscReal Wt[],
+                                 const PetscReal H[], PetscReal *misfit)
 {
   PetscReal *P;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(m * n, &P));
-  PetscCall(Product("TN", m, n, k, Wt, H, P));
+  PetscCall(NNMFProduct("TN", m, n, k, Wt, H, P));
   *misfit = 0;
   for (PetscInt i = 0; i < m * n; i++) *misfit += (S[i] - P[i]) * (S[i] - P[i]);
   PetscCall(PetscFree(P));
@@ -239,9 +239,9 @@ PetscErrorCode HycoNNMF(PetscInt m, PetscInt n, const PetscReal S[], PetscInt k,
   PetscCall(PetscMalloc4(m * n, &scaled, k * m, &Wt, k * n, &H, k * k + 4 * k * PetscMax(m, n), &room));
   /* ROUND_OFF is absolute, while forces may have any unit. */
   for (PetscInt i = 0; i < m * n; i++) scaled[i] = S[i] / norm;
-  PetscCall(Start(m, n, scaled, k, Wt, H));
-  PetscCall(Alternate(m, n, k, scaled, max_its, Wt, H, room));
-  PetscCall(Misfit(m, n, k, scaled, Wt, H, misfit));
+  PetscCall(NNMFStart(m, n, scaled, k, Wt, H));
+  PetscCall(NNMFAlternate(m, n, k, scaled, max_its, Wt, H, room));
+  PetscCall(NNMFMisfit(m, n, k, scaled, Wt, H, misfit));
   for (PetscInt c = 0; c < k; c++) {
     PetscReal length = 0, use = 0;
 

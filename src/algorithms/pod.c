@@ -74,7 +74,7 @@ static PetscErrorCode FixSigns(Mat V, PetscInt l)
 }
 
 /* Computes the first `most` triplets of S; fixed: the options give another number. */
-static PetscErrorCode Solve(SVD svd, Mat S, PetscInt most, PetscBool *fixed)
+static PetscErrorCode PODSolve(SVD svd, Mat S, PetscInt most, PetscBool *fixed)
 {
   PetscInt N, n, asked;
   SVDType type;
@@ -186,7 +186,7 @@ static PetscErrorCode SolveAccurate(SVD svd, Mat S, PetscReal size, PetscReal to
   for (PetscInt most = PetscMin(limit, FIRST); more; most = PetscMin(limit, 2 * most)) {
     PetscReal rest = size * size;
 
-    PetscCall(Solve(svd, S, most, &fixed));
+    PetscCall(PODSolve(svd, S, most, &fixed));
     PetscCall(GetValues(svd, k, sigma, &found));
     PetscCall(GetVectors(svd, S, found, &V));
     PetscCall(CountAccurate(S, V, found, sigma, accurate));
@@ -224,7 +224,7 @@ PetscErrorCode HycoPOD(SVD svd, Mat S, PetscReal tol, PetscReal noise, PetscInt 
                                                                  absolute */
   PetscCall(MatScale(S, 1 / unit));
   if (tsqr) {
-    PetscCall(Solve(svd, S, k, &fixed));
+    PetscCall(PODSolve(svd, S, k, &fixed));
     PetscCall(GetValues(svd, k, sigma, &found));
   } else
     PetscCall(SolveAccurate(svd, S, size / unit, tol, noise, max_modes, k, sigma, &found));

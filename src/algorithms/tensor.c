@@ -39,7 +39,7 @@ static void NextPolynomial(PetscInt n, const PetscReal s[], PetscInt d, PetscRea
 
 /* s[n + 1]: the nodes and the point `at` in [-1, 1], where the polynomials are of one size whatever the parameter's
    unit. */
-static void Scale(PetscInt n, const PetscReal x[], PetscReal at, PetscReal s[])
+static void TensorScale(PetscInt n, const PetscReal x[], PetscReal at, PetscReal s[])
 {
   const PetscReal middle = (x[0] + x[n - 1]) / 2, half = x[n - 1] > x[0] ? (x[n - 1] - x[0]) / 2 : 1;
 
@@ -57,7 +57,7 @@ PetscErrorCode HycoPolynomialWeights(PetscInt n, const PetscReal x[], PetscInt d
   PetscCall(PetscArrayzero(weight, n));
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc2(n + 1, &s, (top + 1) * (n + 1), &P));
-  Scale(n, x, at, s);
+  TensorScale(n, x, at, s);
   for (PetscInt d = 0; d <= top; d++) {
     const PetscReal *p = P + d * (n + 1);
 
@@ -100,7 +100,7 @@ PetscErrorCode HycoTensorWeights(const HycoTensor *t, const PetscReal at[], Pets
 }
 
 /* value[rows] = data weight, data rows x nodes by columns. */
-static PetscErrorCode Sum(const HycoGridField *f, const PetscReal weight[], PetscReal value[])
+static PetscErrorCode TensorSum(const HycoGridField *f, const PetscReal weight[], PetscReal value[])
 {
   const PetscReal one = 1, zero = 0;
   const PetscBLASInt step = 1;
@@ -123,7 +123,7 @@ PetscErrorCode HycoGridFieldEvaluate(const HycoGridField *f, const PetscReal at[
   if (!f->rows) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(HycoTensorSize(&f->tensor), &w));
   PetscCall(HycoTensorWeights(&f->tensor, at, w));
-  PetscCall(Sum(f, w, value));
+  PetscCall(TensorSum(f, w, value));
   PetscCall(PetscFree(w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -142,7 +142,7 @@ PetscErrorCode HycoTensorPolynomials(const HycoTensor *t, PetscReal Q[])
     if (n == 1) continue;
     after /= n; /* nodes of the axes after this one */
     PetscCall(PetscMalloc2(n + 1, &s, n * (n + 1), &P));
-    Scale(n, t->x[p], t->x[p][0], s);
+    TensorScale(n, t->x[p], t->x[p][0], s);
     for (PetscInt d = 0; d < n; d++) NextPolynomial(n, s, d, P);
     for (PetscInt i = 0; i < size * size; i++) Q[i] *= P[i % size / after % n * (n + 1) + i / size / after % n];
     PetscCall(PetscFree2(s, P));

@@ -30,8 +30,8 @@ static PetscErrorCode SetUp(SVD svd)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rows of A on this rank that take part: those with an entry, as of one body among several, or, if few rows have none,
-   all. *whole: all of them on every rank, which has at least as many as there are columns. Collective. */
+/* The rows of A on this rank that take part: those with an entry, as of one body among several, or, if few rows have
+   none, all. *whole: all of them on every rank, which has at least as many as there are columns. Collective. */
 static PetscErrorCode FindRows(Mat A, PetscInt *count, PetscInt **row, PetscBool *whole)
 {
   PetscInt n, rows, lda, most[2];
@@ -64,8 +64,8 @@ static PetscErrorCode FindRows(Mat A, PetscInt *count, PetscInt **row, PetscBool
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Copies these rows of the dense matrix A to the first ones of B, or (back) the first ones of A to these of B; the others
-   of B are 0. */
+/* Copies these rows of the dense matrix A to the first ones of B, or (back) the first ones of A to these of B; the
+   others of B are 0. */
 static PetscErrorCode CopyRows(Mat A, Mat B, PetscBool back, PetscInt count, const PetscInt row[])
 {
   PetscInt n, rows, lda, ldb;
@@ -114,8 +114,9 @@ static PetscErrorCode DecomposeTriangle(PetscInt n, PetscScalar R[], PetscReal s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Q, whose n columns SLEPc's tall-skinny QR makes orthonormal: svd->U if all rows take part, otherwise of those that do,
-   and of rows of zeros if they are fewer than n, as SLEPc requires. Zero rows change neither R nor the singular values. */
+/* Q, whose n columns SLEPc's tall-skinny QR makes orthonormal: svd->U if all rows take part, otherwise of those that
+   do, and of rows of zeros if they are fewer than n, as SLEPc requires. Zero rows change neither R nor the singular
+   values. */
 static PetscErrorCode MakeBasis(SVD svd, PetscBool whole, PetscInt count, const PetscInt row[], BV *Q)
 {
   const PetscInt n = svd->ncv;
@@ -162,7 +163,7 @@ static PetscErrorCode StoreRight(BV V, PetscInt n, const PetscScalar Vt[])
 
 /* A = Q R, R = U s V^T: left vectors are Q U. Singular values from R are accurate to round-off of the largest, while a
    Gram matrix would lose half of the digits. */
-static PetscErrorCode Solve(SVD svd)
+static PetscErrorCode TSQRSolve(SVD svd)
 {
   const PetscInt n = svd->ncv;
   BV Q;
@@ -202,11 +203,11 @@ static PetscErrorCode Solve(SVD svd)
 }
 
 /* A type of SLEPc's SVD, so that options, monitors and views are those of the others. */
-static PetscErrorCode Create(SVD svd)
+static PetscErrorCode TSQRCreate(SVD svd)
 {
   PetscFunctionBegin;
   svd->ops->setup = SetUp;
-  svd->ops->solve = Solve;
+  svd->ops->solve = TSQRSolve;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -218,6 +219,6 @@ PetscErrorCode HycoSVDRegisterAll(void)
   PetscFunctionBegin;
   PetscCall(SVDInitializePackage());
   PetscCall(PetscFunctionListFind(SVDList, HYCO_SVD_TSQR, &create));
-  if (!create) PetscCall(SVDRegister(HYCO_SVD_TSQR, Create));
+  if (!create) PetscCall(SVDRegister(HYCO_SVD_TSQR, TSQRCreate));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

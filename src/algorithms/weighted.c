@@ -55,7 +55,7 @@ PetscErrorCode HycoWeightedDestroy(HycoWeighted *weighted)
 }
 
 /* y = S^T t */
-static void Transposed(HycoWeighted f, const PetscReal t[], PetscReal y[])
+static void WeightedNNLSTransposed(HycoWeighted f, const PetscReal t[], PetscReal y[])
 {
   const PetscBLASInt m = (PetscBLASInt)f->m, n = (PetscBLASInt)f->n, inc = 1;
   const PetscReal one = 1, zero = 0;
@@ -65,14 +65,14 @@ static void Transposed(HycoWeighted f, const PetscReal t[], PetscReal y[])
 
 /* Column j of S^T diag(d) S + shift. Computed at the first use: few columns become passive. Valid for the d of the
    present call. */
-static const PetscReal *Gram(HycoWeighted f, PetscInt j)
+static const PetscReal *WeightedNNLSGram(HycoWeighted f, PetscInt j)
 {
   const PetscReal *s = f->S + (size_t)j * (size_t)f->m;
   PetscReal *column = f->G + (size_t)j * (size_t)f->n;
 
   if (f->known[j]) return column;
   for (PetscInt i = 0; i < f->m; i++) f->t[i] = f->d[i] * s[i];
-  Transposed(f, f->t, column);
+  WeightedNNLSTransposed(f, f->t, column);
   column[j] += f->shift;
   f->known[j] = PETSC_TRUE;
   return column;
@@ -80,9 +80,9 @@ static const PetscReal *Gram(HycoWeighted f, PetscInt j)
 
 /* Makes column j passive; false if it depends on the passive ones. A row of the Cholesky factor, from the known
    columns. rest: what is left of the diagonal. */
-static PetscBool Append(HycoWeighted f, PetscInt j)
+static PetscBool WeightedNNLSAppend(HycoWeighted f, PetscInt j)
 {
-  const PetscReal *column = Gram(f, j);
+  const PetscReal *column = WeightedNNLSGram(f, j);
   PetscReal *r = f->R + (size_t)f->k * (size_t)f->n, rest = column[j];
 
   for (PetscInt i = 0; i < f->k; i++) {
@@ -101,7 +101,7 @@ static PetscBool Append(HycoWeighted f, PetscInt j)
 }
 
 /* z = G[p, p]^-1 y[p], by position in p */
-static void Solve(HycoWeighted f, const PetscReal y[], PetscReal z[])
+static void WeightedNNLSSolve(HycoWeighted f, const PetscReal y[], PetscReal z[])
 {
   for (PetscInt i = 0; i < f->k; i++) {
     const PetscReal *r = f->R + (size_t)i * (size_t)f->n;
@@ -130,7 +130,7 @@ static PetscBool MoveTowards(HycoWeighted f, const PetscReal z[], PetscReal x[])
   for (PetscInt j = 0; j < k; j++) {
     const PetscInt column = f->p[j];
 
-    if (x[column] > 0 && Append(f, column)) continue;
+    if (x[column] > 0 && WeightedNNLSAppend(f, column)) continue;
     x[column] = 0;
     f->passive[column] = PETSC_FALSE;
   }
@@ -138,7 +138,7 @@ static PetscBool MoveTowards(HycoWeighted f, const PetscReal z[], PetscReal x[])
 }
 
 /* w = S^T h - G x from the passive columns. */
-static void Gradient(HycoWeighted f, const PetscReal x[])
+static void WeightedNNLSGradient(HycoWeighted f, const PetscReal x[])
 {
   for (PetscInt i = 0; i < f->n; i++) f->w[i] = f->g[i];
   for (PetscInt j = 0; j < f->k; j++) {
@@ -158,18 +158,18 @@ static void TrueGradient(HycoWeighted f, const PetscReal x[])
     for (PetscInt i = 0; i < f->m; i++) f->t[i] += c * s[i];
   }
   for (PetscInt i = 0; i < f->m; i++) f->t[i] = f->h[i] - f->d[i] * f->t[i];
-  Transposed(f, f->t, f->w);
+  WeightedNNLSTransposed(f, f->t, f->w);
   for (PetscInt j = 0; j < f->k; j++) f->w[f->p[j]] -= f->shift * x[f->p[j]];
 }
 
 /* One step of refinement on the passive set, then the gradient: returns its largest entry where it should be zero or
    negative. The normal equations lose digits that S still has. */
-static PetscReal Refine(HycoWeighted f, PetscReal x[])
+static PetscReal WeightedNNLSRefine(HycoWeighted f, PetscReal x[])
 {
   PetscReal worst = 0;
 
   TrueGradient(f, x);
-  Solve(f, f->w, f->z);
+  WeightedNNLSSolve(f, f->w, f->z);
   for (PetscInt j = 0; j < f->k; j++) x[f->p[j]] = PetscMax(x[f->p[j]] + f->z[j], 0);
   TrueGradient(f, x);
   for (PetscInt j = 0; j < f->n; j++)
@@ -178,7 +178,7 @@ static PetscReal Refine(HycoWeighted f, PetscReal x[])
 }
 
 /* The next column: among those allowed the one with the largest gradient; -1: none above tol. */
-static PetscInt Steepest(HycoWeighted f, PetscReal tol)
+static PetscInt WeightedNNLSSteepest(HycoWeighted f, PetscReal tol)
 {
   PetscInt best = -1;
 
@@ -189,7 +189,8 @@ static PetscInt Steepest(HycoWeighted f, PetscReal tol)
 }
 
 /* No column is passive at first: the gradient is then S^T h. d and h are borrowed until the next call. */
-static PetscErrorCode Begin(HycoWeighted f, const PetscReal d[], const PetscReal h[], PetscReal x[], PetscReal *size)
+static PetscErrorCode WeightedNNLSBegin(HycoWeighted f, const PetscReal d[], const PetscReal h[], PetscReal x[],
+                                        PetscReal *size)
 {
   PetscFunctionBegin;
   f->d = d;
@@ -199,7 +200,7 @@ static PetscErrorCode Begin(HycoWeighted f, const PetscReal d[], const PetscReal
   PetscCall(PetscArrayzero(f->known, f->n));
   PetscCall(PetscArrayzero(f->passive, f->n));
   PetscCall(PetscArrayzero(f->banned, f->n));
-  Transposed(f, h, f->g);
+  WeightedNNLSTransposed(f, h, f->g);
   PetscCall(PetscArraycpy(f->w, f->g, f->n));
   *size = 0;
   for (PetscInt j = 0; j < f->n; j++) *size = PetscMax(*size, PetscAbsReal(f->g[j]));
@@ -214,27 +215,27 @@ PetscErrorCode HycoWeightedNNLS(HycoWeighted f, const PetscReal d[], const Petsc
   PetscReal size, worst = 0;
 
   PetscFunctionBegin;
-  PetscCall(Begin(f, d, h, x, &size));
+  PetscCall(WeightedNNLSBegin(f, d, h, x, &size));
   for (PetscInt it = 0; it < 3 * f->n + 10; it++) {
-    PetscInt best = Steepest(f, 1e-12 * size);
+    PetscInt best = WeightedNNLSSteepest(f, 1e-12 * size);
 
     /* The refinement costs two products with S, and is made only when the cheap gradient finds no column. */
     if (best < 0) { /* first by the normal equations, then by S */
-      worst = Refine(f, x);
-      best = Steepest(f, 1e-12 * size);
+      worst = WeightedNNLSRefine(f, x);
+      best = WeightedNNLSSteepest(f, 1e-12 * size);
     }
     if (best < 0) break;
     f->banned[best] = PETSC_TRUE; /* until the set changes */
-    if (!Append(f, best)) continue;
-    Solve(f, f->g, f->z);
+    if (!WeightedNNLSAppend(f, best)) continue;
+    WeightedNNLSSolve(f, f->g, f->z);
     if (f->z[f->k - 1] <= 0) { /* not a descent direction */
       f->k--;
       continue;
     }
     f->passive[best] = PETSC_TRUE;
-    while (!MoveTowards(f, f->z, x)) Solve(f, f->g, f->z);
+    while (!MoveTowards(f, f->z, x)) WeightedNNLSSolve(f, f->g, f->z);
     PetscCall(PetscArrayzero(f->banned, f->n));
-    Gradient(f, x);
+    WeightedNNLSGradient(f, x);
     worst = PETSC_MAX_REAL; /* until the refinement */
   }
   *solved = (PetscBool)(worst <= rtol * size);

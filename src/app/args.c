@@ -79,7 +79,7 @@ static PetscErrorCode ListTakers(const char name[], char list[DRIVER_LINE])
 }
 
 /* The most helpful reason first: an option of another command, then a near name, then that there is none. */
-static PetscErrorCode Unknown(const Command *command, const HycoOptionList *own, const char name[])
+static PetscErrorCode OptionUnknown(const Command *command, const HycoOptionList *own, const char name[])
 {
   const char *near;
   char takers[DRIVER_LINE];
@@ -155,7 +155,7 @@ static PetscErrorCode CheckName(const Command *command, const HycoOptionList *ow
             "%s follows %s, which expects a value, and looks like an option; write a value that begins with a dash and "
             "a letter with a blank first, %s \" %s\", or in scene.yaml",
             word, previous, previous, word);
-  PetscCall(Unknown(command, own, name));
+  PetscCall(OptionUnknown(command, own, name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -212,8 +212,9 @@ PetscErrorCode DriverRefuseOnly(const char only[], const char reason[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Options of the command line and of the files that it names: others, of ~/.petscrc and PETSC_OPTIONS, are for all programs. */
-static PetscErrorCode CreateGiven(PetscOptions *given)
+/* Options of the command line and of the files that it names: others, of ~/.petscrc and PETSC_OPTIONS, are for all
+   programs. */
+static PetscErrorCode CreateGivenLoads(PetscOptions *given)
 {
   int argc;
   char **argv;
@@ -225,7 +226,8 @@ static PetscErrorCode CreateGiven(PetscOptions *given)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether it is an error that this rank has not read an option. Early: what solvers read with the first solve counts as read. */
+/* Whether it is an error that this rank has not read an option. Early: what solvers read with the first solve counts as
+   read. */
 static PetscErrorCode IsMissed(const char name[], PetscOptions given, PetscBool early, PetscBool *missed)
 {
   char dashed[2 * DRIVER_LINE];
@@ -241,7 +243,8 @@ static PetscErrorCode IsMissed(const char name[], PetscOptions given, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An option that no rank has read is a typing error or has no effect here; both would go unnoticed. The ranks' options are the same. */
+/* An option that no rank has read is a typing error or has no effect here; both would go unnoticed. The ranks' options
+   are the same. */
 static PetscErrorCode CheckLeft(PetscBool early)
 {
   PetscInt n;
@@ -249,7 +252,7 @@ static PetscErrorCode CheckLeft(PetscBool early)
   char **names, **values, all[DRIVER_LINE], first[DRIVER_LINE] = "";
 
   PetscFunctionBegin;
-  PetscCall(CreateGiven(&given));
+  PetscCall(CreateGivenLoads(&given));
   PetscCall(PetscOptionsLeftGet(NULL, &n, &names, &values));
   for (PetscInt k = 0, most = n; !first[0]; k++) {
     PetscBool missed = PETSC_FALSE, shows;

@@ -4,7 +4,8 @@
 
 /* Facets of the slave larger than the master's by this factor are reported as coarser, a modulus as stiffer. */
 #define COARSER 1.5
-/* Of second order pressures alternate from node to node, by 8 to 13 % of the peak, if the slave is finer by more than this. */
+/* Of second order pressures alternate from node to node, by 8 to 13 % of the peak, if the slave is finer by more than
+   this. */
 #define FINER   0.5
 #define STIFFER 1.5
 /* A smallest gap above this share of the mesh's extent does not close by small displacements. */
@@ -54,7 +55,7 @@ static void WarnOrder(Check *check, const HycoContactInspection *c)
 }
 
 /* What is probably a mistake, not what is an error: the scene can be solved. */
-static void Warn(Check *check, const HycoContactInspection *c)
+static void ContactCheckWarn(Check *check, const HycoContactInspection *c)
 {
   const PetscReal length = check->in.length;
 
@@ -102,7 +103,7 @@ static void WarnBothWays(Check *check, PetscInt k)
 }
 
 /* One line for each contact, composed of what is known. */
-static PetscErrorCode Print(const HycoContactInspection *c)
+static PetscErrorCode ContactCheckPrint(const HycoContactInspection *c)
 {
   PetscFunctionBegin;
   PetscCall(DriverPrint("contact %s, %s: %d nodes of %s", c->name, c->type, (int)c->n, c->slave));
@@ -148,8 +149,8 @@ PetscErrorCode CheckReportContacts(Check *check)
     if (c->coarse > 0) cJSON_AddNumberToObject(contact, "slave_over_master", c->coarse);
     if (c->stiff_max > 0)
       ReportNumbers(contact, {"stiffness_over_master_min", c->stiff_min}, {"stiffness_over_master_max", c->stiff_max});
-    PetscCall(Print(c));
-    Warn(check, c);
+    PetscCall(ContactCheckPrint(c));
+    ContactCheckWarn(check, c);
     WarnBothWays(check, k);
   }
   cJSON_AddNumberToObject(check->json, "n_without_effect", n_without);

@@ -36,7 +36,7 @@ PetscErrorCode CheckReportSolve(Check *check, HycoFOM fom)
 }
 
 /* Two digits: estimates are no better. */
-static void Seconds(PetscReal t, char text[32])
+static void CostSeconds(PetscReal t, char text[32])
 {
   if (t < 60)
     snprintf(text, 32, "%.2g s", (double)t);
@@ -61,7 +61,7 @@ static PetscErrorCode PrintTraining(Check *check, HycoSamples samples, cJSON *ob
   if (n_times) n_stiff = n;
   training = n_stiff * in->first + (n - n_stiff) * in->next;
   snapshots = 8 * in->n_values * n;
-  Seconds(training, all);
+  CostSeconds(training, all);
   PetscCall(DriverPrint(
       "a training on %s%d solutions, including held-out ones: about %s of full-order solves, and %.3g MB of "
       "solutions; the reduction is not included\n",
@@ -78,8 +78,8 @@ static PetscErrorCode PrintBodies(Check *check, cJSON *object)
   char least[32], most[32];
 
   PetscFunctionBegin;
-  Seconds(in->body_training[0], least);
-  Seconds(in->body_training[1], most);
+  CostSeconds(in->body_training[0], least);
+  CostSeconds(in->body_training[1], most);
   PetscCall(
       DriverPrint("a model of bodies, which train tries first, without the training solutions: %s to %s with held-out "
                   "solutions and reduction, and %.2g ms a prediction\n",
@@ -111,8 +111,8 @@ PetscErrorCode CheckReportCost(Check *check, HycoSamples samples, PetscBool solv
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetHistory(check->scene, &n_times, NULL));
-  Seconds(in->first, first);
-  Seconds(in->next, next);
+  CostSeconds(in->first, first);
+  CostSeconds(in->next, next);
   /* A measured history is a whole path; unmeasured, one linear solve is all that can be estimated. */
   if (n_times && solved)
     PetscCall(DriverPrint("a full-order solve of the history, as measured: %s", first));

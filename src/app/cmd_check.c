@@ -64,7 +64,7 @@ static PetscErrorCode ReportVariable(Check *check, PetscInt p, cJSON *reaches)
 }
 
 /* What was found, on rank 0. */
-static PetscErrorCode Describe(Check *check)
+static PetscErrorCode CheckCommandDescribe(Check *check)
 {
   const HycoInspection *in = &check->in;
   const PetscReal *times;
@@ -125,7 +125,7 @@ PetscErrorCode DeclareCheck(PetscOptions options)
 
 /* Prints the warnings and writes the report. All ranks have created `json`; ReportWrite() is collective and writes
    on rank 0. */
-static PetscErrorCode Finish(Check *check)
+static PetscErrorCode CheckCommandFinish(Check *check)
 {
   const int n = cJSON_GetArraySize(check->warnings);
 
@@ -163,10 +163,10 @@ PetscErrorCode CommandCheck(void)
   PetscCall(ReportCreate("check", check.scene, NULL, &check.json));
   check.warnings = cJSON_CreateArray();
   HycoStaged(HYCO_STAGE_FULL_ORDER, HycoInspect(fom, &check.in));
-  HycoOnRoot(PETSC_COMM_WORLD, Describe(&check));
+  HycoOnRoot(PETSC_COMM_WORLD, CheckCommandDescribe(&check));
   if (solve) HycoStaged(HYCO_STAGE_FULL_ORDER, CheckReportSolve(&check, fom));
   PetscCall(CheckReportCost(&check, given ? samples : NULL, solve));
-  PetscCall(Finish(&check));
+  PetscCall(CheckCommandFinish(&check));
   PetscCall(HycoInspectionDestroy(&check.in));
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(HycoSamplesDestroy(&samples));

@@ -100,8 +100,8 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The errors of the outputs at the listed times that both paths reached, on the model's process: v: at their worst time, and at the end. loose: at one the
-   position of a body is arbitrary. */
+/* The errors of the outputs at the listed times that both paths reached, on the model's process: v: at their worst
+   time, and at the end. loose: at one the position of a body is arbitrary. */
 static PetscErrorCode CompareOutputs(HycoFOM fom, HycoROM model, PetscBool loose, const Outputs *outputs, PetscReal v[])
 {
   HycoHistory full, reduced;
@@ -261,7 +261,7 @@ PetscErrorCode DeclareCompare(PetscOptions options)
 }
 
 /* The motion of the first point of all ranks. */
-static PetscErrorCode PrintLoose(const Points *p)
+static PetscErrorCode PrintFreeMotion(const Points *p)
 {
   PetscInt first = *p->loose;
   PetscMPIInt rank = HycoRank(PETSC_COMM_WORLD);
@@ -327,7 +327,7 @@ PetscErrorCode CommandCompare(void)
   /* Before the report, which fails if a prediction did not converge. */
   if (table[0]) PetscCall(DriverWriteTable(table, scene, p.mu, p.columns.names, &rows));
   PetscCall(DriverWarnSliding(sliding));
-  PetscCall(PrintLoose(&p));
+  PetscCall(PrintFreeMotion(&p));
   PetscCall(HycoROMGetTrainingCost(model, &training));
   PetscCall(DriverReportComparison(scene, contact, training, &p.columns, p.n, p.value));
   PetscCall(PetscFree(p.value));

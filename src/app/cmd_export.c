@@ -21,7 +21,7 @@ PetscErrorCode DeclareExport(PetscOptions options)
 }
 
 /* On rank 0. */
-static PetscErrorCode Export(const char model[], const char path[])
+static PetscErrorCode ExportCommandRun(const char model[], const char path[])
 {
   HycoROM m = NULL;
   char *description = NULL;
@@ -49,6 +49,6 @@ PetscErrorCode CommandExport(void)
   PetscCall(DriverRequire("model", model));
   PetscCall(DriverRequire("c", path));
   PetscCall(DriverCheckLeft());
-  HycoOnRoot(PETSC_COMM_WORLD, Export(model, path));
+  HycoOnRoot(PETSC_COMM_WORLD, ExportCommandRun(model, path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

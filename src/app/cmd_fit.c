@@ -1,6 +1,6 @@
 /*
-  hyco fit: the parameter values at which a model's outputs are closest to targets, HycoROMFit(); the answer is solved once
-  at full order.
+  hyco fit: the parameter values at which a model's outputs are closest to targets, HycoROMFit(); the answer is solved
+  once at full order.
 */
 #include "driver.h"
 #include <stdlib.h>
@@ -117,7 +117,7 @@ static PetscErrorCode ReadTargets(Fit *f)
 /* -- the fit, the same on each rank -- */
 
 /* The prediction at the answer is the model's last. */
-static PetscErrorCode Run(Fit *f, const Settings *s)
+static PetscErrorCode FitCommandRun(Fit *f, const Settings *s)
 {
   HycoPrediction at;
 
@@ -155,7 +155,8 @@ static PetscErrorCode LoadScene(const Fit *f, const char path[], HycoScene *scen
 
 /* One full-order solve at the answer: full[k], the outputs with targets. Collective. Fails before anything is
    written: an answer that full order cannot confirm is none. */
-static PetscErrorCode Check(const Fit *f, HycoScene scene, const PetscInt at[], const PetscReal mu[], PetscReal full[])
+static PetscErrorCode FitCommandCheck(const Fit *f, HycoScene scene, const PetscInt at[], const PetscReal mu[],
+                                      PetscReal full[])
 {
   HycoFOM fom;
   HycoSummary summary;
@@ -175,7 +176,7 @@ static PetscErrorCode Check(const Fit *f, HycoScene scene, const PetscInt at[], 
 }
 
 /* The root mean square of the relative differences from the targets. */
-static PetscReal Mean(const Fit *f, const PetscReal value[])
+static PetscReal FitCommandMean(const Fit *f, const PetscReal value[])
 {
   PetscReal sum = 0;
 
@@ -211,18 +212,18 @@ static PetscErrorCode PrintAnswer(const Fit *f, const PetscReal full[], cJSON *j
     PetscCall(DriverPrint("%s%s\n", units[f->output[k] % n][0] ? " " : "", units[f->output[k] % n]));
   }
   /* By the scales of the fit, so that outputs of different units weigh the same. */
-  cJSON_AddNumberToObject(json, "misfit_model", Mean(f, value));
-  PetscCall(DriverPrint("misfit (relative, root mean square): model %.2g", (double)Mean(f, value)));
-  if (full) cJSON_AddNumberToObject(json, "misfit_full_order", Mean(f, full));
+  cJSON_AddNumberToObject(json, "misfit_model", FitCommandMean(f, value));
+  PetscCall(DriverPrint("misfit (relative, root mean square): model %.2g", (double)FitCommandMean(f, value)));
+  if (full) cJSON_AddNumberToObject(json, "misfit_full_order", FitCommandMean(f, full));
   if (full)
-    PetscCall(DriverPrint(", full order %.2g\n", (double)Mean(f, full)));
+    PetscCall(DriverPrint(", full order %.2g\n", (double)FitCommandMean(f, full)));
   else
     PetscCall(DriverPrint("; not checked at full order, for which -scene is needed\n"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* A fit that ended at no minimum is a miss (exit status 3), with its report written. */
-static PetscErrorCode Report(const Fit *f, const PetscReal held[], const PetscReal full[])
+static PetscErrorCode FitCommandReport(const Fit *f, const PetscReal held[], const PetscReal full[])
 {
   const HycoFit *fit = &f->fit;
   const PetscReal *mu = f->mu;
@@ -272,7 +273,8 @@ static PetscErrorCode Report(const Fit *f, const PetscReal held[], const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -mu or -mu_NAME as the start, and what is held. Without -mu the start is searched; DriverGetPoint() would require all parameters. */
+/* -mu or -mu_NAME as the start, and what is held. Without -mu the start is searched; DriverGetPoint() would require all
+   parameters. */
 static PetscErrorCode ReadStart(const Fit *f, Settings *s)
 {
   const char *const *names;
@@ -299,7 +301,7 @@ static PetscErrorCode ReadStart(const Fit *f, Settings *s)
 static PetscErrorCode RunOnEach(Fit *f, const Settings *s)
 {
   PetscFunctionBegin;
-  HycoOnEach(PETSC_COMM_WORLD, Run(f, s));
+  HycoOnEach(PETSC_COMM_WORLD, FitCommandRun(f, s));
   PetscCallMPI(MPI_Bcast(f->mu, MOST, MPIU_REAL, 0, PETSC_COMM_WORLD));
   PetscCallMPI(MPI_Bcast(&f->fit.converged, 1, HYCO_MPI_BOOL, 0, PETSC_COMM_WORLD));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -352,9 +354,9 @@ PetscErrorCode CommandFit(void)
     PetscCall(DriverRefuseOnly("full order", "it is for full order, which fit solves only with -scene"));
   PetscCall(DriverCheckLeftEarly());
   HycoStaged(HYCO_STAGE_ONLINE, RunOnEach(&f, &s));
-  if (scene) HycoStaged(HYCO_STAGE_FULL_ORDER, Check(&f, scene, at, f.mu, full));
+  if (scene) HycoStaged(HYCO_STAGE_FULL_ORDER, FitCommandCheck(&f, scene, at, f.mu, full));
   /* Last, since it may end in a miss: the answer is complete by then. */
-  PetscCall(Report(&f, s.held, scene ? full : NULL));
+  PetscCall(FitCommandReport(&f, s.held, scene ? full : NULL));
   PetscCall(HycoSceneDestroy(&scene));
   PetscCall(HycoROMDestroy(&f.model));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -5,11 +5,13 @@
 #include <stdio.h>
 #include <string.h>
 
-#define PIECES      16 /* number of pieces of a set for each rank: expensive points delay the end by at most one piece */
+#define PIECES                                                                                                         \
+  16                   /* number of pieces of a set for each rank: expensive points delay the end by at most one
+                          piece */
 #define LEAST_PIECE 64 /* number of points in a piece, unless a rank has fewer */
 
 /* Negative: there is none, null in JSON. */
-static void Estimate(cJSON *json, const char name[], PetscReal estimate)
+static void PredictCommandEstimate(cJSON *json, const char name[], PetscReal estimate)
 {
   if (estimate >= 0)
     cJSON_AddNumberToObject(json, name, estimate);
@@ -25,14 +27,14 @@ static PetscErrorCode ReportEstimates(cJSON *json, HycoScene scene, const HycoPr
   PetscInt n;
 
   PetscFunctionBegin;
-  Estimate(json, "estimated_error_u", p->estimated_error_u);
-  Estimate(json, "estimated_error_sigma", p->estimated_error_sigma);
-  Estimate(json, "estimated_error_lambda", p->estimated_error_lambda);
+  PredictCommandEstimate(json, "estimated_error_u", p->estimated_error_u);
+  PredictCommandEstimate(json, "estimated_error_sigma", p->estimated_error_sigma);
+  PredictCommandEstimate(json, "estimated_error_lambda", p->estimated_error_lambda);
   PetscCall(HycoSceneGetQuantities(scene, &n, names));
   outputs = n ? cJSON_AddObjectToObject(json, "estimated_error_outputs") : NULL;
-  for (PetscInt q = 0; q < n; q++) Estimate(outputs, names[q], p->estimated_error_quantity[q]);
-  Estimate(json, "inconsistency", p->inconsistency);
-  Estimate(json, "balance", p->balance);
+  for (PetscInt q = 0; q < n; q++) PredictCommandEstimate(outputs, names[q], p->estimated_error_quantity[q]);
+  PredictCommandEstimate(json, "inconsistency", p->inconsistency);
+  PredictCommandEstimate(json, "balance", p->balance);
   cJSON_AddNumberToObject(json, "unseen", p->unseen);
   /* The feature matters only where it is out of the range of the training. */
   if (p->unseen > HYCO_UNSEEN) cJSON_AddStringToObject(json, "unseen_feature", HycoFeatureNames[p->unseen_feature]);
@@ -115,9 +117,10 @@ static void ReportRID(cJSON *json, const HycoPrediction *p)
 
 /* carried: results of the contacts (n_carried; 0: not known). fallback: the reason for full order; "": not used.
    whole: u is that of the whole mesh. path: NULL, or with a history. gradient: NULL, or that of the prediction. */
-static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPrediction *p, PetscInt n_carried,
-                             const HycoContactResult carried[], PetscReal energy, const char fallback[],
-                             PetscBool whole, const DriverReducedPath *path, const HycoGradient *gradient)
+static PetscErrorCode PredictCommandReport(HycoScene scene, const PetscReal mu[], const HycoPrediction *p,
+                                           PetscInt n_carried, const HycoContactResult carried[], PetscReal energy,
+                                           const char fallback[], PetscBool whole, const DriverReducedPath *path,
+                                           const HycoGradient *gradient)
 {
   cJSON *json;
 
@@ -150,7 +153,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   cJSON_AddBoolToObject(json, "full_order", fallback[0] != '\0');
   if (fallback[0]) cJSON_AddStringToObject(json, "fallback", fallback);
   if (p->gives_forces) {
-    Estimate(json, "interpolation_error", p->interpolation_error);
+    PredictCommandEstimate(json, "interpolation_error", p->interpolation_error);
     cJSON_AddBoolToObject(json, "full_displacement", whole && !fallback[0]);
   }
   ReportKKT(json, &p->kkt);
@@ -181,7 +184,7 @@ static PetscErrorCode PrintReduced(const HycoPrediction *p)
 }
 
 /* One path: writes what it reached, and fails if that is not its end. */
-static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[], PetscBool derives)
+static PetscErrorCode PredictCommandPath(HycoROM model, HycoScene scene, const char output[], PetscBool derives)
 {
   DriverReducedPath path = {0};
   HycoPrediction p = {0};
@@ -218,7 +221,8 @@ static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[], 
   /* A path that ended early has none, and is an error below. */
   derives = (PetscBool)(derives && p.reason > 0);
   if (derives) HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetGradient(model, &gradient));
-  PetscCall(Report(scene, mu, &p, n_carried, carried, energy, "", PETSC_FALSE, &path, derives ? &gradient : NULL));
+  PetscCall(PredictCommandReport(scene, mu, &p, n_carried, carried, energy, "", PETSC_FALSE, &path,
+                                 derives ? &gradient : NULL));
   PetscCall(PetscFree(carried));
   PetscCall(PetscFree(path.step));
   HycoCheck(
@@ -335,7 +339,7 @@ static PetscErrorCode DestroyShape(Shape *s)
 }
 
 /* NaN: how a table marks that there is no estimate. */
-static PetscReal Known(PetscReal estimate)
+static PetscReal PredictCommandValueOrNaN(PetscReal estimate)
 {
   return estimate >= 0 ? estimate : NAN;
 }
@@ -353,14 +357,14 @@ static void FillRow(const HycoPrediction *p, PetscInt n_carried, const HycoConta
   v[CONVERGED] = p->reason > 0;
   v[ITERATIONS] = p->iterations;
   v[SECONDS] = p->seconds.total;
-  /* Known() makes not a number of what the model does not know. */
-  v[ESTIMATE_U] = Known(p->estimated_error_u);
-  v[ESTIMATE_SIGMA] = Known(p->estimated_error_sigma);
-  v[ESTIMATE_LAMBDA] = Known(p->estimated_error_lambda);
+  /* PredictCommandValueOrNaN() makes not a number of what the model does not know. */
+  v[ESTIMATE_U] = PredictCommandValueOrNaN(p->estimated_error_u);
+  v[ESTIMATE_SIGMA] = PredictCommandValueOrNaN(p->estimated_error_sigma);
+  v[ESTIMATE_LAMBDA] = PredictCommandValueOrNaN(p->estimated_error_lambda);
   v[BEYOND] = p->beyond;
   v[UNSEEN] = p->unseen;
-  v[INCONSISTENCY] = Known(p->inconsistency);
-  v[BALANCE] = Known(p->balance);
+  v[INCONSISTENCY] = PredictCommandValueOrNaN(p->inconsistency);
+  v[BALANCE] = PredictCommandValueOrNaN(p->balance);
   v[FORCES_UNIQUE] = p->n_dependent < 0 ? NAN : p->n_dependent == 0;
   if (s->own > PATH_FORCE) {
     v[PATH_FORCE] = p->path_force;
@@ -374,7 +378,7 @@ static void FillRow(const HycoPrediction *p, PetscInt n_carried, const HycoConta
   for (PetscInt k = s->own; k < s->with_quantities; k++) v[k] = p->quantity[k - s->own];
   for (PetscInt k = s->with_quantities; k < s->with_extremes; k++) v[k] = p->path_quantity[k - s->with_quantities];
   for (PetscInt k = s->with_extremes; k < s->with_estimates; k++)
-    v[k] = Known(p->estimated_error_quantity[k - s->with_extremes]);
+    v[k] = PredictCommandValueOrNaN(p->estimated_error_quantity[k - s->with_extremes]);
   DriverCarriedFill(&s->carried, n_carried, carried, v + s->with_estimates);
   /* A point that failed has no results, and its row stays. */
   for (PetscInt c = 0; c < s->with_carried && p->reason <= 0; c++) {
@@ -384,8 +388,8 @@ static void FillRow(const HycoPrediction *p, PetscInt n_carried, const HycoConta
   }
 }
 
-/* The table of a single point: a set's, with one row. whole: u is that of the whole mesh. gradient: NULL, or that of the
-   prediction, which rank 0 has. */
+/* The table of a single point: a set's, with one row. whole: u is that of the whole mesh. gradient: NULL, or that of
+   the prediction, which rank 0 has. */
 static PetscErrorCode WriteRow(HycoROM model, HycoScene scene, const PetscReal mu[], const HycoPrediction *p,
                                PetscInt n_carried, const HycoContactResult carried[], PetscBool full_order,
                                PetscBool whole, const HycoGradient *gradient, const char table[])
@@ -411,7 +415,8 @@ static PetscErrorCode WriteRow(HycoROM model, HycoScene scene, const PetscReal m
 
 /* One point: rank 0 predicts while the others wait; all solve full order if the fallback requires it, or with its
    forces. */
-static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, const char output[], PetscBool derives)
+static PetscErrorCode PredictCommandPoint(HycoROM model, HycoScene scene, Fallback *fallback, const char output[],
+                                          PetscBool derives)
 {
   HycoPrediction p = {0};
   HycoGradient gradient = {0};
@@ -470,8 +475,8 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
   if (table[0])
     PetscCall(WriteRow(model, scene, mu, &p, n_carried, carried, (PetscBool)(why[0] != '\0'),
                        (PetscBool)(why[0] || fallback->displacement), derives ? &gradient : NULL, table));
-  PetscCall(Report(scene, mu, &p, n_carried, carried, energy, why, (PetscBool)(why[0] || fallback->displacement), NULL,
-                   derives ? &gradient : NULL));
+  PetscCall(PredictCommandReport(scene, mu, &p, n_carried, carried, energy, why,
+                                 (PetscBool)(why[0] || fallback->displacement), NULL, derives ? &gradient : NULL));
   PetscCall(PetscFree(own));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -513,7 +518,7 @@ static PetscErrorCode TakePoint(HycoROM model, PetscInt k, void *ctx)
     PetscCall(DriverGradientCatch(&t->shape->gradients, &gradient, caught, t->lacking, v + t->shape->with_carried));
   }
   DriverWantsFullOrder(t->fallback, &p, why);
-  v[FULL_ORDER] = why[0] != '\0'; /* required; SolveRest() solves it */
+  v[FULL_ORDER] = why[0] != '\0'; /* required; SolveRemaining() solves it */
   t->n_unseen += !why[0] && p.unseen > HYCO_UNSEEN;
   t->n_inconsistent += !why[0] && p.inconsistent;
   t->n_unbalanced += !why[0] && p.unbalanced;
@@ -640,8 +645,8 @@ static PetscReal *FindRow(const DriverRows *rows, PetscInt k)
 
 /* Solves by all ranks together the points where the reduced model was not sufficient. After all predictions, so
    that the full-order model and its factor are made once. */
-static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n_par, const PetscReal mu[], const Shape *s,
-                                const DriverRows *rows)
+static PetscErrorCode SolveRemaining(Fallback *fallback, PetscInt n_par, const PetscReal mu[], const Shape *s,
+                                     const DriverRows *rows)
 {
   const HycoContactResult *carried;
   PetscInt n, n_carried, *list;
@@ -674,8 +679,8 @@ static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n_par, const PetscR
 }
 
 /* The seconds are those of the predictions and solves, without the fields. */
-static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, HycoSamples samples, const char output[],
-                           PetscBool derives)
+static PetscErrorCode PredictCommandPoints(HycoROM model, HycoScene scene, Fallback *fallback, HycoSamples samples,
+                                           const char output[], PetscBool derives)
 {
   PetscInt n, n_par;
   Shape s = {.gradients = {.on = derives}};
@@ -694,7 +699,7 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
   rows.width = s.width;
   begin = HycoNow();
   PetscCall(PredictAll(model, fallback, n_par, mu, &s, &rows));
-  PetscCall(SolveRest(fallback, n_par, mu, &s, &rows));
+  PetscCall(SolveRemaining(fallback, n_par, mu, &s, &rows));
   begin = HycoNow() - begin;
   if (output[0]) HycoOnRoot(PETSC_COMM_WORLD, HycoROMWriteMany(model, n, n_par, mu, output));
   PetscCall(ReportSet("predict", table, scene, samples, s.names, &rows, begin));
@@ -769,10 +774,10 @@ PetscErrorCode CommandPredict(void)
     HycoCheck(!fallback.displacement,
               "-hyco_full_displacement needs a single point (-mu); a set of points has only a -table, without fields");
     PetscCall(DriverGetSamples(scene, PETSC_FALSE, &samples, &set));
-    HycoStaged(HYCO_STAGE_ONLINE, Many(model, scene, &fallback, samples, output, derives));
+    HycoStaged(HYCO_STAGE_ONLINE, PredictCommandPoints(model, scene, &fallback, samples, output, derives));
   } else {
-    HycoStaged(HYCO_STAGE_ONLINE,
-               n_times ? Path(model, scene, output, derives) : One(model, scene, &fallback, output, derives));
+    HycoStaged(HYCO_STAGE_ONLINE, n_times ? PredictCommandPath(model, scene, output, derives)
+                                          : PredictCommandPoint(model, scene, &fallback, output, derives));
   }
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(DriverEndFallback(&fallback));

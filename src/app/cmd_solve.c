@@ -3,7 +3,7 @@
 #include <math.h>
 
 /* Prints remarks that the user should know. */
-static PetscErrorCode Remarks(const HycoSummary *s, PetscInt n, const HycoStep step[])
+static PetscErrorCode SolveCommandRemarks(const HycoSummary *s, PetscInt n, const HycoStep step[])
 {
   PetscFunctionBegin;
   if (s->regularised[0]) PetscCall(DriverPrint("regularised: neither supports nor contact keep %s\n", s->regularised));
@@ -62,8 +62,8 @@ static PetscErrorCode PrintReactions(cJSON *json, HycoFOM fom, PetscInt dim)
 
 /* gradient: NULL, or that of the solution. Text and JSON together, so that both have the same numbers in the same
    order. */
-static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom, const HycoSummary *s,
-                             const HycoGradient *gradient)
+static PetscErrorCode SolveCommandReport(HycoScene scene, const PetscReal mu[], HycoFOM fom, const HycoSummary *s,
+                                         const HycoGradient *gradient)
 {
   cJSON *json;
   HycoSolver solver;
@@ -104,7 +104,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   if (history.n) PetscCall(DriverReportHistory(json, scene, &history));
   PetscCall(DriverPrint("%d unknowns, %d contacts, %d active after %d iterations (%s)\n", (int)s->n_dof,
                         (int)s->n_contacts, (int)s->n_active, (int)s->iterations, method));
-  PetscCall(Remarks(s, history.n, history.step));
+  PetscCall(SolveCommandRemarks(s, history.n, history.step));
   PetscCall(WarnOfUnits(s->u_relative));
   PetscCall(DriverPrint("total contact force %.10g, largest %.6g; strain energy %.10g, identity to %.1e\n",
                         (double)s->total_contact_force, (double)s->lambda_max, (double)s->strain_energy,
@@ -130,8 +130,8 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
 
 /* A scene with a history: its path. The report is written for a path that reached its end; DriverEndHistory()
    fails for others, after the table. */
-static PetscErrorCode Path(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char output[], const char table[],
-                           PetscBool derives)
+static PetscErrorCode SolveCommandPath(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char output[],
+                                       const char table[], PetscBool derives)
 {
   HycoSummary summary;
   DriverPath path = {0};
@@ -149,7 +149,7 @@ static PetscErrorCode Path(HycoFOM fom, HycoScene scene, const PetscReal mu[], c
   PetscCall(DriverEndHistory(fom, scene, mu, table));
   if (derives) PetscCall(HycoFOMGetGradient(fom, &gradient));
   PetscCall(HycoFOMGetSummary(fom, &summary));
-  PetscCall(Report(scene, mu, fom, &summary, derives ? &gradient : NULL));
+  PetscCall(SolveCommandReport(scene, mu, fom, &summary, derives ? &gradient : NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -304,8 +304,8 @@ static PetscErrorCode WriteRow(HycoFOM fom, HycoScene scene, const PetscReal mu[
 }
 
 /* Not converged: nothing is written, neither fields nor report. */
-static PetscErrorCode One(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char output[], const char table[],
-                          PetscBool derives)
+static PetscErrorCode SolveCommandPoint(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char output[],
+                                        const char table[], PetscBool derives)
 {
   HycoSummary summary;
   HycoGradient gradient;
@@ -322,13 +322,13 @@ static PetscErrorCode One(HycoFOM fom, HycoScene scene, const PetscReal mu[], co
   if (derives) PetscCall(HycoFOMGetGradient(fom, &gradient));
   if (output[0]) PetscCall(HycoFOMWrite(fom, output));
   if (table[0]) PetscCall(WriteRow(fom, scene, mu, &summary, derives ? &gradient : NULL, table));
-  PetscCall(Report(scene, mu, fom, &summary, derives ? &gradient : NULL));
+  PetscCall(SolveCommandReport(scene, mu, fom, &summary, derives ? &gradient : NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Solves the points in their order, each from the last one's active contacts, by all ranks together. */
-static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, const char output[], const char table[],
-                           PetscBool derives)
+static PetscErrorCode SolveCommandPoints(HycoFOM fom, HycoScene scene, HycoSamples samples, const char output[],
+                                         const char table[], PetscBool derives)
 {
   PetscInt n, n_par;
   const PetscReal *mu;
@@ -351,7 +351,7 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
     PetscCall(HycoFOMGetSummary(fom, &s));
     if (s.loose[0] && !n_loose++) PetscCall(PetscStrncpy(loose, s.loose, sizeof(loose)));
     s.loose[0] = '\0'; /* of the set, below */
-    if (k == 0) PetscCall(Remarks(&s, 0, NULL));
+    if (k == 0) PetscCall(SolveCommandRemarks(&s, 0, NULL));
     /* The dimension is known from the first solution. */
     if (k == 0) PetscCall(CreateTable(scene, s.dim, n, &t));
     if (s.reason > 0) u_relative = PetscMax(u_relative, s.u_relative);
@@ -425,9 +425,9 @@ PetscErrorCode CommandSolve(void)
   /* The handle is the FOM's: options have been read by its creation. */
   if (monitor) PetscCall(HycoSolverSetMonitor(solver, DriverMonitor, NULL));
   PetscCall(DriverCheckLeftEarly());
-  HycoStaged(HYCO_STAGE_FULL_ORDER, set       ? Many(fom, scene, samples, output, table, derives)
-                                    : n_times ? Path(fom, scene, mu, output, table, derives)
-                                              : One(fom, scene, mu, output, table, derives));
+  HycoStaged(HYCO_STAGE_FULL_ORDER, set       ? SolveCommandPoints(fom, scene, samples, output, table, derives)
+                                    : n_times ? SolveCommandPath(fom, scene, mu, output, table, derives)
+                                              : SolveCommandPoint(fom, scene, mu, output, table, derives));
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSceneDestroy(&scene));

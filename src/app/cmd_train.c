@@ -41,7 +41,8 @@ static PetscErrorCode ReportGroups(cJSON *json, HycoReducer reducer)
 #define TIMED 25 /* predictions for their time */
 #define LONG  1. /* seconds after which fewer are enough */
 
-/* The mean processor time of predictions by the written model, with outputs and estimates, as a set makes them. Rank 0. */
+/* The mean processor time of predictions by the written model, with outputs and estimates, as a set makes them. Rank
+   0. */
 static PetscErrorCode TimeModel(HycoScene scene, const char path[], PetscReal *each)
 {
   HycoSamples points;
@@ -82,8 +83,8 @@ static PetscErrorCode ReportGain(cJSON *json, HycoScene scene, const char path[]
 }
 
 /* The keys are those of docs/output.md, which is made from outputs_list.c. */
-static PetscErrorCode Report(HycoScene scene, HycoReducer reducer, const char path[], const HycoTraining *t,
-                             const GreedyLog *log, const Search *search)
+static PetscErrorCode TrainCommandReport(HycoScene scene, HycoReducer reducer, const char path[], const HycoTraining *t,
+                                         const GreedyLog *log, const Search *search)
 {
   PetscInt n_par;
   cJSON *json, *seconds;
@@ -286,7 +287,7 @@ PetscErrorCode CommandTrain(void)
   PetscCall(DriverPrint("seconds: %.2f snapshots, %.2f reduction; model in %s\n", (double)t.seconds_snapshots,
                         (double)t.seconds_reduction, model));
   if (greedy) PetscCall(DriverJudgeGreedy(&log));
-  PetscCall(Report(scene, reducer, model, &t, &log, &search));
+  PetscCall(TrainCommandReport(scene, reducer, model, &t, &log, &search));
   PetscCall(PetscFree(search.text));
   PetscCall(PetscFree(log.text));
   PetscCall(HycoSamplesDestroy(&training));

@@ -5,7 +5,7 @@
 #include <string.h>
 
 /* Appends names; the text is kept in the struct, since tables borrow it. */
-static PetscErrorCode Add(DriverColumns *c, PetscInt n, const char before[], const char *const names[])
+static PetscErrorCode CompareReportAdd(DriverColumns *c, PetscInt n, const char before[], const char *const names[])
 {
   PetscFunctionBegin;
   for (PetscInt k = 0; k < n; k++, c->n++) {
@@ -30,15 +30,17 @@ PetscErrorCode DriverCompareColumns(PetscBool paths, PetscInt n_outputs, const c
   PetscFunctionBegin;
   c->paths = paths;
   c->n = 0;
-  PetscCall(paths ? Add(c, HYCO_N_ERRORS, "worst_", HycoErrorKinds) : Add(c, DRIVER_LAMBDA_DUAL + 1, "error_", errors));
-  if (paths) PetscCall(Add(c, HYCO_N_ERRORS, "end_", HycoErrorKinds));
+  PetscCall(paths ? CompareReportAdd(c, HYCO_N_ERRORS, "worst_", HycoErrorKinds)
+                  : CompareReportAdd(c, DRIVER_LAMBDA_DUAL + 1, "error_", errors));
+  if (paths) PetscCall(CompareReportAdd(c, HYCO_N_ERRORS, "end_", HycoErrorKinds));
   c->n_errors = c->n;
-  PetscCall(paths ? Add(c, DRIVER_CPU_ROM + 1, "", path) : Add(c, DRIVER_SIGMA_NORM + 1, "", point));
+  PetscCall(paths ? CompareReportAdd(c, DRIVER_CPU_ROM + 1, "", path)
+                  : CompareReportAdd(c, DRIVER_SIGMA_NORM + 1, "", point));
   c->estimates = c->n;
-  PetscCall(Add(c, DRIVER_ESTIMATES + 2, "", judged));
+  PetscCall(CompareReportAdd(c, DRIVER_ESTIMATES + 2, "", judged));
   c->outputs = c->n;
-  PetscCall(Add(c, n_outputs, paths ? "worst_output_" : "error_output_", outputs));
-  if (paths) PetscCall(Add(c, n_outputs, "end_output_", outputs));
+  PetscCall(CompareReportAdd(c, n_outputs, paths ? "worst_output_" : "error_output_", outputs));
+  if (paths) PetscCall(CompareReportAdd(c, n_outputs, "end_output_", outputs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -52,7 +54,7 @@ static int CompareReal(const void *a, const void *b)
 
 /* A relative error of a quantity with this norm, for the estimates: norms below a tenth of the set's largest count as
    this tenth. */
-static PetscReal Guarded(PetscReal error, PetscReal size, PetscReal largest)
+static PetscReal CompareReportRelativeError(PetscReal error, PetscReal size, PetscReal largest)
 {
   return size > 0 ? error * size / PetscMax(size, 0.1 * largest) : error;
 }
@@ -67,7 +69,7 @@ static void GuardErrors(const DriverColumns *c, PetscInt n, PetscReal value[])
 
     for (PetscInt k = 0; k < n; k++) largest = PetscMax(largest, value[k * c->n + norm]);
     for (PetscInt k = 0; k < n; k++)
-      value[k * c->n + j] = Guarded(value[k * c->n + j], value[k * c->n + norm], largest);
+      value[k * c->n + j] = CompareReportRelativeError(value[k * c->n + j], value[k * c->n + norm], largest);
   }
 }
 
@@ -139,7 +141,7 @@ typedef struct {
   PetscInt undefined, failed, fallback;
 } Totals;
 
-static void Sum(const DriverColumns *c, PetscInt n, const PetscReal value[], Totals *t)
+static void CompareReportSum(const DriverColumns *c, PetscInt n, const PetscReal value[], Totals *t)
 {
   /* The least covered force begins at all of it. */
   *t = (Totals){.covered = {0, 1}};
@@ -195,7 +197,7 @@ PetscErrorCode DriverReportComparison(HycoScene scene, PetscBool contact, PetscR
   PetscFunctionBegin;
   HycoDuplicate(n * c->n, given, &value);
   if (!c->paths) GuardErrors(c, n, value);
-  Sum(c, n, value, &t);
+  CompareReportSum(c, n, value, &t);
   PetscCall(ReportCreate("compare", scene, NULL, &json));
   cJSON_AddNumberToObject(json, "n_points", n);
   PetscCall(DriverPrint("%d %s%s%s\n", (int)n, c->paths ? "path" : "point", n == 1 ? "" : "s",

@@ -54,7 +54,8 @@ PetscErrorCode DriverGetCarried(HycoROM model, HycoScene scene, PetscInt *n, Hyc
 /* The columns of a contact in a table; their names follow the contact's name and a dot. */
 enum { WIDTH = 10 };
 /* One function for names and values: they cannot get out of step. */
-static PetscInt List(PetscInt dim, const HycoContactResult *r, const char *name[WIDTH], PetscReal value[WIDTH])
+static PetscInt ContactColumnsList(PetscInt dim, const HycoContactResult *r, const char *name[WIDTH],
+                                   PetscReal value[WIDTH])
 {
   static const char *const force[] = {"force_x", "force_y", "force_z"}, *const moment[] = {"moment_x", "moment_y",
                                                                                            "moment_z"};
@@ -83,7 +84,7 @@ PetscErrorCode DriverCarriedColumns(HycoScene scene, PetscInt dim, DriverCarried
   PetscCall(PetscMalloc1(columns->n_contacts, &contact));
   PetscCall(HycoSceneGetContacts(scene, &columns->n_contacts, contact));
   /* The values of `none` are not used: only the names and their number. */
-  columns->each = List(dim, &none, name, value);
+  columns->each = ContactColumnsList(dim, &none, name, value);
   PetscCall(PetscMalloc1(columns->n_contacts * columns->each, &columns->name));
   for (PetscInt k = 0; k < columns->n_contacts * columns->each; k++)
     PetscCall(
@@ -99,7 +100,7 @@ void DriverCarriedFill(const DriverCarried *columns, PetscInt n, const HycoConta
 
   for (PetscInt k = 0; k < columns->n_contacts; k++, v += columns->each) {
     if (n)
-      List(columns->dim, &r[k], name, v);
+      ContactColumnsList(columns->dim, &r[k], name, v);
     else
       for (PetscInt c = 0; c < columns->each; c++) v[c] = NAN;
   }

@@ -24,7 +24,8 @@ extern const Command commands[]; /* ends with name NULL */
 
 /* Checks that every option on the command line is known to `command`, or PETSc's, and that there are no other words. */
 PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **argv);
-/* Fails for options that were given on the command line, but that no rank has read: at the end of each command, when its results are written. */
+/* Fails for options that were given on the command line, but that no rank has read: at the end of each command, when
+   its results are written. */
 PetscErrorCode DriverCheckLeft(void);
 /* The same before the solvers have run: options that one of them may read are accepted. */
 PetscErrorCode DriverCheckLeftEarly(void);
@@ -38,8 +39,8 @@ PetscErrorCode DriverReadFiles(char scene[], char model[], char output[], char r
 PetscErrorCode DriverRequire(const char name[], const char value[]);
 /* Prints the options of a command (NULL: all). On this process alone. */
 PetscErrorCode DriverHelp(const Command *command);
-/* hyco help output: a line for each key, column and dataset that the command writes, with tabs between its parts: place, commands, name,
-   kind, unit, meaning. */
+/* hyco help output: a line for each key, column and dataset that the command writes, with tabs between its parts:
+   place, commands, name, kind, unit, meaning. */
 PetscErrorCode DriverHelpOutput(void);
 /* Whether an object of the command reads an option of the library. Of a model's, some are read by one command only. */
 PetscBool DriverReads(const Command *command, const HycoOption *option);
@@ -54,7 +55,8 @@ PetscErrorCode DriverCheckMesh(HycoScene scene);
 
 /* -- points.c: points in the parameter space; without a scene, these functions only declare their options -- */
 
-/* One point: -mu v,v,... or -mu_NAME v. held: values of parameters that need no -mu_NAME, NaN: it needs one; NULL: all do. */
+/* One point: -mu v,v,... or -mu_NAME v. held: values of parameters that need no -mu_NAME, NaN: it needs one; NULL: all
+   do. */
 PetscErrorCode DriverGetPoint(HycoScene scene, const PetscReal held[], PetscReal mu[]);
 /* -extrapolate, of predict and compare. */
 PetscErrorCode DriverReadExtrapolate(PetscBool *extrapolate);

@@ -1,4 +1,5 @@
-/* -gradient: derivatives of the outputs with respect to the parameters, in the report, the text and the columns of a table. */
+/* -gradient: derivatives of the outputs with respect to the parameters, in the report, the text and the columns of a
+   table. */
 #include "driver.h"
 #include <string.h>
 

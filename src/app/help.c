@@ -66,7 +66,7 @@ static const struct {
 
 /* The length of the longest word of a list with which a name begins. Words of a list, separated by blanks; the
    length lets the most specific subject win. */
-static size_t Begins(const char list[], const char name[])
+static size_t HelpPrefixLength(const char list[], const char name[])
 {
   size_t longest = 0;
 
@@ -86,7 +86,7 @@ static int SubjectOf(const char name[])
   int best = N_SUBJECTS - 1;
 
   for (int k = 0; k < N_SUBJECTS; k++) {
-    const size_t n = Begins(subjects[k].beginnings, name);
+    const size_t n = HelpPrefixLength(subjects[k].beginnings, name);
 
     /* The longest beginning wins: hyco_pod_ is another subject than hyco_. */
     if (n > longest) {
@@ -107,7 +107,8 @@ static void HelpLine(const HycoOption *o)
 }
 
 /* All options that a command reads (all commands: NULL). `own` holds the commands', which the list borrows. */
-static PetscErrorCode Collect(const Command *command, const HycoOptionList *own, PetscInt *n, const HycoOption ***list)
+static PetscErrorCode HelpCollect(const Command *command, const HycoOptionList *own, PetscInt *n,
+                                  const HycoOption ***list)
 {
   const HycoOption *table;
   PetscInt m;
@@ -179,7 +180,7 @@ PetscErrorCode DriverHelp(const Command *command)
     /* Of all commands into one list, in which an option of several appears once. */
     PetscCall(HycoOptionsRecord(&own, commands[k].declare));
   }
-  PetscCall(Collect(command, &own, &n, &list));
+  PetscCall(HelpCollect(command, &own, &n, &list));
   for (size_t k = 0; command && k < sizeof(pages) / sizeof(pages[0]); k++) {
     if (strcmp(pages[k].command, command->name) == 0) PrintPage(&pages[k], n, list);
   }

@@ -41,7 +41,7 @@ const Command commands[] = {
 static char message[DRIVER_LINE];
 
 /* Keeps the text of an error where it is raised, not of the calls that it passes through; of several errors the last is
-   the one that ends the run. Stop() prints it as one line. */
+   the one that ends the run. DriverStop() prints it as one line. */
 static PetscErrorCode KeepMessage(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
                                   PetscErrorType type, const char *text, void *ctx)
 {
@@ -72,7 +72,7 @@ int __lsan_is_turned_off(void)
 
 /* Ends a failed run: one line from the lowest rank with the error. Ranks that wait for this one in a collective call
    are ended too. */
-static void Stop(void)
+static void DriverStop(void)
 {
   PetscMPIInt rank;
   MPI_Request request;
@@ -154,7 +154,7 @@ static int AnswerAtOnce(int argc, char **argv)
 
 /* Checks that cost nothing come first; DriverProgressBegin() starts the thread after them, since a refused run
    needs none. */
-static PetscErrorCode Run(const Command *command, int argc, char **argv)
+static PetscErrorCode DriverRun(const Command *command, int argc, char **argv)
 {
   PetscFunctionBegin;
   PetscCall(DriverCheckLaunch());
@@ -167,7 +167,7 @@ static PetscErrorCode Run(const Command *command, int argc, char **argv)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* In place of PetscErrorPrintf while PETSc starts: Start() prints one line instead of a trace. */
+/* In place of PetscErrorPrintf while PETSc starts: DriverStart() prints one line instead of a trace. */
 static PetscErrorCode PrintNothing(const char format[], ...)
 {
   (void)format;
@@ -176,7 +176,7 @@ static PetscErrorCode PrintNothing(const char format[], ...)
 
 /* PETSc reads the option files and the options; an error is printed as one line instead of PETSc's trace. Output to a
    closed pipe ("hyco ... | head") is no error, and PETSc must not abort at its signal. */
-static PetscErrorCode Start(int *argc, char ***argv)
+static PetscErrorCode DriverStart(int *argc, char ***argv)
 {
   PetscErrorCode (*const printf_of_petsc)(const char[], ...) = PetscErrorPrintf;
   PetscErrorCode ierr;
@@ -196,7 +196,7 @@ static PetscErrorCode Start(int *argc, char ***argv)
 }
 
 /* hyco help, hyco COMMAND -help: the declarations of the classes and the commands, for which PETSc is needed. */
-static int Help(char **argv)
+static int DriverPrintHelp(char **argv)
 {
   const Command *command = argv[1] ? FindCommand(argv[1]) : NULL;
   PetscErrorCode ierr = 0;
@@ -204,7 +204,7 @@ static int Help(char **argv)
 
   /* Help needs PETSc, but no other rank and no network. */
   DriverStartAlone();
-  if (Start(&argc, &argv)) return DRIVER_FAILED;
+  if (DriverStart(&argc, &argv)) return DRIVER_FAILED;
   if (HycoRank(MPI_COMM_WORLD) == 0) {
     if (!command && argv[1] && argv[2]) command = FindCommand(argv[2]); /* hyco help COMMAND */
     ierr = !command && argv[1] && argv[2] && strcmp(argv[2], "output") == 0 ? DriverHelpOutput() : DriverHelp(command);
@@ -214,7 +214,7 @@ static int Help(char **argv)
 }
 
 /* Whether it solves full order. Otherwise a restart, where it is needed, would take longer than a prediction. */
-static int Factors(const Command *command)
+static int DriverFactors(const Command *command)
 {
   return command->run == CommandSolve || command->run == CommandTrain || command->run == CommandCompare;
 }
@@ -230,21 +230,21 @@ int main(int argc, char **argv)
   /* A line in one piece: glibc 2.37 and later write to an unbuffered stream in pieces of 128 bytes, which launchers and
      other ranks mix up. */
   setvbuf(stderr, NULL, _IOLBF, BUFSIZ);
-  if (AsksHelp(argc, argv)) return Help(argv);
+  if (AsksHelp(argc, argv)) return DriverPrintHelp(argv);
   status = AnswerAtOnce(argc, argv);
   if (status >= 0) return status;
-  if (Factors(FindCommand(argv[1]))) DriverChooseKernels(argv);
+  if (DriverFactors(FindCommand(argv[1]))) DriverChooseKernels(argv);
   (void)HycoBLASSetThreads(1); /* threads of all ranks together would exceed the cores */
   DriverNoteLaunch();
   DriverStartAlone();
-  if (Start(&argc, &argv)) return 1;
+  if (DriverStart(&argc, &argv)) return 1;
   PetscPushErrorHandler(KeepMessage, NULL); /* after PetscInitialize(), where PETSc's memory log (-malloc_dump)
                                                begins */
   signal(SIGXFSZ, SIG_IGN);                 /* a file beyond the size limit is reported as a failed write */
-  ierr = Run(FindCommand(argv[1]), argc, argv);
+  ierr = DriverRun(FindCommand(argv[1]), argc, argv);
   DriverProgressEnd();
   PetscPopErrorHandler();
-  if (ierr) Stop();
+  if (ierr) DriverStop();
   fflush(stdout);
   /* Unread options have been checked; as PETSc does if they are asked for. */
   PetscOptionsHasName(NULL, NULL, "-options_left", &listed);

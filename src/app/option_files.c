@@ -8,7 +8,7 @@
 
 #define DEEPEST 16 /* files that name each other */
 
-static PetscBool Follow(const char path[], PetscBool yaml, int depth, char problem[HYCO_LINE]);
+static PetscBool OptionFileRead(const char path[], PetscBool yaml, int depth, char problem[HYCO_LINE]);
 
 /* Follows the option files that a line of options names; a quoted name is not followed. strtok_r() changes the
    line: callers give a copy. */
@@ -20,7 +20,8 @@ static PetscBool FollowLine(char line[], int depth, char problem[HYCO_LINE])
   for (word = strtok_r(line, " \t\r\n", &rest); word; word = strtok_r(NULL, " \t\r\n", &rest)) {
     const PetscBool yaml = (PetscBool)(strcasecmp(before, "-options_file_yaml") == 0);
 
-    if ((yaml || strcasecmp(before, "-options_file") == 0) && !Follow(word, yaml, depth, problem)) return PETSC_FALSE;
+    if ((yaml || strcasecmp(before, "-options_file") == 0) && !OptionFileRead(word, yaml, depth, problem))
+      return PETSC_FALSE;
     /* The option of which the next word is the value. */
     before = word;
   }
@@ -29,7 +30,7 @@ static PetscBool FollowLine(char line[], int depth, char problem[HYCO_LINE])
 
 /* Whether PETSc can read an option file, if it exists, and those that it names; PETSc itself never ends if a file names
    itself, and gives no line of an error. */
-static PetscBool Follow(const char path[], PetscBool yaml, int depth, char problem[HYCO_LINE])
+static PetscBool OptionFileRead(const char path[], PetscBool yaml, int depth, char problem[HYCO_LINE])
 {
   struct stat info; /* a pipe can be read only once */
   FILE *file = depth < DEEPEST && stat(path, &info) == 0 && S_ISREG(info.st_mode) ? fopen(path, "r") : NULL;
@@ -70,8 +71,8 @@ PetscBool DriverCheckOptionFiles(int argc, char **argv)
 
   for (int k = 1; k < argc; k++) skip = (PetscBool)(skip || strcmp(argv[k], "-skip_petscrc") == 0);
   snprintf(path, sizeof(path), "%s/.petscrc", home ? home : "");
-  if (!skip && home) good = Follow(path, PETSC_FALSE, 0, problem);
-  for (int k = 0; good && !skip && k < 2; k++) good = Follow(files[k], PETSC_FALSE, 0, problem);
+  if (!skip && home) good = OptionFileRead(path, PETSC_FALSE, 0, problem);
+  for (int k = 0; good && !skip && k < 2; k++) good = OptionFileRead(files[k], PETSC_FALSE, 0, problem);
   if (good && environment) {
     /* FollowLine() cuts the text, and the environment's must stay. */
     char *line = strdup(environment);
@@ -82,7 +83,7 @@ PetscBool DriverCheckOptionFiles(int argc, char **argv)
   for (int k = 1; good && k < argc - 1; k++) {
     const PetscBool yaml = (PetscBool)(strcasecmp(argv[k], "-options_file_yaml") == 0);
 
-    if (yaml || strcasecmp(argv[k], "-options_file") == 0) good = Follow(argv[k + 1], yaml, 0, problem);
+    if (yaml || strcasecmp(argv[k], "-options_file") == 0) good = OptionFileRead(argv[k + 1], yaml, 0, problem);
   }
   return good ? good : DriverRefuseEarly(problem);
 }

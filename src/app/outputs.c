@@ -8,7 +8,7 @@
 #include <strings.h>
 
 /* The value of an option, "" if absent, without counting it as read. */
-static PetscErrorCode Peek(const char name[], char value[PETSC_MAX_PATH_LEN])
+static PetscErrorCode OutputFileReadOption(const char name[], char value[PETSC_MAX_PATH_LEN])
 {
   PetscInt n;
   char **names, **values;
@@ -35,7 +35,7 @@ static PetscInt n_outputs;
 
 /* Adds a file to be written, or (else) checks one to be read: it must not be one of those to be written, whatever
    its name. */
-static PetscErrorCode Take(const char what[], const char path[], PetscBool output)
+static PetscErrorCode OutputFileAdd(const char what[], const char path[], PetscBool output)
 {
   Named *taken = &outputs[n_outputs];
 
@@ -65,8 +65,8 @@ static PetscErrorCode AddFields(const char path[])
   PetscFunctionBegin;
   PetscCall(HycoFieldsCheckPath(path));
   PetscCall(HycoFieldsNumbers(path, h5));
-  PetscCall(Take("-output", path, PETSC_TRUE));
-  if (strcmp(path, h5)) PetscCall(Take("the .h5 file of -output", h5, PETSC_TRUE));
+  PetscCall(OutputFileAdd("-output", path, PETSC_TRUE));
+  if (strcmp(path, h5)) PetscCall(OutputFileAdd("the .h5 file of -output", h5, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -74,7 +74,7 @@ static PetscErrorCode AddFields(const char path[])
 PetscErrorCode DriverSnapshotFolder(const char model[], char folder[PETSC_MAX_PATH_LEN])
 {
   PetscFunctionBegin;
-  PetscCall(Peek("hyco_snapshots", folder));
+  PetscCall(OutputFileReadOption("hyco_snapshots", folder));
   if (!folder[0]) snprintf(folder, PETSC_MAX_PATH_LEN, "%.*s.snapshots", PETSC_MAX_PATH_LEN - 16, model);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -86,7 +86,7 @@ static PetscErrorCode AddSnapshots(const char model[])
 
   PetscFunctionBegin;
   PetscCall(DriverSnapshotFolder(model, folder));
-  PetscCall(Take("the snapshot folder", folder, PETSC_TRUE));
+  PetscCall(OutputFileAdd("the snapshot folder", folder, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -97,9 +97,9 @@ static PetscErrorCode CheckSceneFile(void)
   struct stat info;
 
   PetscFunctionBegin;
-  PetscCall(Peek("scene", path));
+  PetscCall(OutputFileReadOption("scene", path));
   snprintf(file, sizeof(file), "%s%s", path, stat(path, &info) == 0 && S_ISDIR(info.st_mode) ? "/scene.yaml" : "");
-  PetscCall(Take("-scene", file, PETSC_FALSE));
+  PetscCall(OutputFileAdd("-scene", file, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -116,27 +116,28 @@ static PetscErrorCode CheckNames(PetscBool trains)
   PetscFunctionBegin;
   /* The list is static: this may be called again. */
   n_outputs = 0;
-  PetscCall(Peek("model", model));
-  if (trains) PetscCall(Take("-model", model, PETSC_TRUE));
+  PetscCall(OutputFileReadOption("model", model));
+  if (trains) PetscCall(OutputFileAdd("-model", model, PETSC_TRUE));
   for (PetscInt k = 0; written[k]; k++) {
-    PetscCall(Peek(written[k] + 1, path));
-    if (path[0]) PetscCall(strcmp(written[k], "-output") ? Take(written[k], path, PETSC_TRUE) : AddFields(path));
+    PetscCall(OutputFileReadOption(written[k] + 1, path));
+    if (path[0])
+      PetscCall(strcmp(written[k], "-output") ? OutputFileAdd(written[k], path, PETSC_TRUE) : AddFields(path));
   }
-  PetscCall(Peek("hyco_checkpoint", path));
-  PetscCall(Take("-hyco_checkpoint", path, PETSC_TRUE));
-  PetscCall(Peek("hyco_write_fclib", path));
-  PetscCall(Take("-hyco_write_fclib", path, PETSC_TRUE));
+  PetscCall(OutputFileReadOption("hyco_checkpoint", path));
+  PetscCall(OutputFileAdd("-hyco_checkpoint", path, PETSC_TRUE));
+  PetscCall(OutputFileReadOption("hyco_write_fclib", path));
+  PetscCall(OutputFileAdd("-hyco_write_fclib", path, PETSC_TRUE));
   /* The snapshots lie beside the model, and are written as well. */
   if (trains && model[0]) PetscCall(AddSnapshots(model));
-  if (!trains) PetscCall(Take("-model", model, PETSC_FALSE));
+  if (!trains) PetscCall(OutputFileAdd("-model", model, PETSC_FALSE));
   PetscCall(CheckSceneFile());
   for (size_t k = 0; k < sizeof(read) / sizeof(read[0]); k++) {
-    PetscCall(Peek(read[k] + 1, path));
-    PetscCall(Take(read[k], path, PETSC_FALSE));
+    PetscCall(OutputFileReadOption(read[k] + 1, path));
+    PetscCall(OutputFileAdd(read[k], path, PETSC_FALSE));
   }
   PetscCall(PetscGetArgs(&argc, &argv));
   for (int k = 2; k < argc - 1; k++) { /* PETSc does not store an option of that name */
-    if (strncmp(argv[k], "-options_file", 13) == 0) PetscCall(Take(argv[k], argv[k + 1], PETSC_FALSE));
+    if (strncmp(argv[k], "-options_file", 13) == 0) PetscCall(OutputFileAdd(argv[k], argv[k + 1], PETSC_FALSE));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -175,13 +176,13 @@ static PetscErrorCode CheckFiles(PetscBool trains)
 
   PetscFunctionBegin;
   PetscCall(CheckNames(trains));
-  PetscCall(Peek("model", path));
+  PetscCall(OutputFileReadOption("model", path));
   if (trains && path[0]) PetscCall(CheckPlace("model", path, HYCO_FILE_NUMBERS));
   for (PetscInt k = 0; k < n_outputs; k++)
     PetscCall(HycoFileSweep(outputs[k].path)); /* removes files left by killed
                                                   runs */
   for (PetscInt k = 0; written[k]; k++) {
-    PetscCall(Peek(written[k] + 1, path));
+    PetscCall(OutputFileReadOption(written[k] + 1, path));
     if (path[0]) PetscCall(CheckPlace(written[k] + 1, path, HYCO_FILE_TEXT));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -202,6 +203,6 @@ PetscErrorCode DriverCheckMesh(HycoScene scene)
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetMesh(scene, &mesh));
-  HycoOnRoot(PETSC_COMM_WORLD, Take("the mesh", mesh, PETSC_FALSE));
+  HycoOnRoot(PETSC_COMM_WORLD, OutputFileAdd("the mesh", mesh, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,10 +1,10 @@
-/* Everything that the command writes for other programs: keys of reports, columns of tables, datasets of files. hyco help
-   output prints this list; scripts/output-page makes docs/output.md and the schema of reports from it. */
+/* Everything that the command writes for other programs: keys of reports, columns of tables, datasets of files. hyco
+   help output prints this list; scripts/output-page makes docs/output.md and the schema of reports from it. */
 #include "driver.h"
 #include <stdio.h>
 
-/* of: the commands, or the kind of file, "all" for all. name: a dot goes into an object, [] into its array, and words in
-   capitals stand for names of the scene. kind: of JSON, "?": or null. unit: "-": none. */
+/* of: the commands, or the kind of file, "all" for all. name: a dot goes into an object, [] into its array, and words
+   in capitals stand for names of the scene. kind: of JSON, "?": or null. unit: "-": none. */
 typedef struct {
   const char *place, *of, *name, *kind, *unit, *meaning;
 } Written;

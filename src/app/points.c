@@ -136,8 +136,8 @@ static PetscErrorCode GetNamed(HycoScene scene, const char prefix[], const char 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Either -mu with all or a -mu_NAME for each: a mixture is refused, since it would not be clear which counts. held: values
-   of those that need no -mu_NAME (NaN: it needs one; NULL: all do). */
+/* Either -mu with all or a -mu_NAME for each: a mixture is refused, since it would not be clear which counts. held:
+   values of those that need no -mu_NAME (NaN: it needs one; NULL: all do). */
 PetscErrorCode DriverGetPoint(HycoScene scene, const PetscReal held[], PetscReal mu[])
 {
   PetscInt n, m, count[64], given;

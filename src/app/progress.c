@@ -46,7 +46,7 @@ static void SetLastWords(const char what[])
 }
 
 /* Async-signal-safe: only write() and _exit(). The solutions are on disk already. */
-static void Interrupted(int number)
+static void ProgressInterrupted(int number)
 {
   if (speaks && words) (void)!write(STDERR_FILENO, words, strlen(words));
   _exit(128 + number);
@@ -59,8 +59,8 @@ PetscErrorCode DriverCatchInterrupt(const char folder[])
   speaks = HycoRank(PETSC_COMM_WORLD) == 0;
   PetscCall(PetscStrncpy(kept_in, folder, sizeof(kept_in)));
   SetLastWords("the");
-  signal(SIGINT, Interrupted);
-  signal(SIGTERM, Interrupted);
+  signal(SIGINT, ProgressInterrupted);
+  signal(SIGTERM, ProgressInterrupted);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -93,7 +93,7 @@ void DriverPercent(PetscReal share, char text[32])
 
 /* A bar, or a line a minute (-progress); n = 0: the number is not known. The last line only if there was another,
    unless `ends`. */
-static void Show(const char word[], PetscInt done, PetscInt n, PetscBool ends)
+static void ProgressShow(const char word[], PetscInt done, PetscInt n, PetscBool ends)
 {
   static PetscReal begin = -1, last = -1;
   static PetscInt first = 0;
@@ -127,7 +127,8 @@ static void Show(const char word[], PetscInt done, PetscInt n, PetscBool ends)
   if (done == n) begin = -1;
 }
 
-/* A HycoProgress of solutions: it also renews the last words, which count those of former calls for other points too. */
+/* A HycoProgress of solutions: it also renews the last words, which count those of former calls for other points
+   too. */
 PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx)
 {
   static PetscInt before, last;
@@ -138,7 +139,7 @@ PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx)
   last = done;
   snprintf(stored, sizeof(stored), "%d", (int)(before + done));
   if (kept_in[0]) SetLastWords(stored);
-  Show((const char *)ctx, done, n, PETSC_TRUE);
+  ProgressShow((const char *)ctx, done, n, PETSC_TRUE);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -150,7 +151,7 @@ PetscErrorCode DriverPhase(const char phase[], PetscInt done, PetscInt n, void *
   PetscFunctionBegin;
   (void)ctx;
   snprintf(word, sizeof(word), "%s:", phase);
-  Show(word, done, n, PETSC_FALSE);
+  ProgressShow(word, done, n, PETSC_FALSE);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -15,7 +15,7 @@ static struct {
 } progress = {.lock = PTHREAD_MUTEX_INITIALIZER, .ends = PTHREAD_COND_INITIALIZER, .period = 60};
 
 /* The realtime clock, which pthread_cond_timedwait() uses. */
-static double Now(void)
+static double ProgressThreadNow(void)
 {
   struct timespec now;
 
@@ -24,7 +24,7 @@ static double Now(void)
 }
 
 /* Called with the lock held. */
-static void Clear(void)
+static void ProgressThreadClear(void)
 {
   if (progress.bar) fprintf(stderr, "\r\033[K");
   progress.bar = PETSC_FALSE;
@@ -45,16 +45,16 @@ static void PrintStep(double now)
 }
 
 /* Wakes up at most once a second, so that the end does not wait for it longer. */
-static void *Run(void *unused)
+static void *ProgressThreadRun(void *unused)
 {
   pthread_mutex_lock(&progress.lock);
   while (!progress.over) {
     /* Half a period at most, so that a line is late by no more than that. */
-    const double next = Now() + PetscMin(1, progress.period / 2);
+    const double next = ProgressThreadNow() + PetscMin(1, progress.period / 2);
     const struct timespec until = {(time_t)next, (long)(1e9 * (next - (double)(time_t)next))};
 
     (void)pthread_cond_timedwait(&progress.ends, &progress.lock, &until);
-    if (!progress.over) PrintStep(Now());
+    if (!progress.over) PrintStep(ProgressThreadNow());
   }
   pthread_mutex_unlock(&progress.lock);
   return unused;
@@ -65,8 +65,9 @@ static void *Run(void *unused)
 void DriverProgressBegin(void)
 {
   if (HycoRank(PETSC_COMM_WORLD)) return;
-  progress.begin = progress.last = Now();
-  progress.runs = (PetscBool)(pthread_create(&progress.thread, NULL, Run, NULL) == 0); /* otherwise there is no such
+  progress.begin = progress.last = ProgressThreadNow();
+  progress.runs =
+      (PetscBool)(pthread_create(&progress.thread, NULL, ProgressThreadRun, NULL) == 0); /* otherwise there is no such
                                                                                    progress */
 }
 
@@ -87,8 +88,8 @@ PetscReal DriverProgressPeriod(void)
 void DriverProgressHold(void)
 {
   pthread_mutex_lock(&progress.lock);
-  Clear();
-  progress.last = Now();
+  ProgressThreadClear();
+  progress.last = ProgressThreadNow();
   pthread_mutex_unlock(&progress.lock);
 }
 
@@ -98,7 +99,7 @@ void DriverProgressEnd(void)
   if (!progress.runs) return;
   pthread_mutex_lock(&progress.lock);
   progress.over = PETSC_TRUE;
-  Clear();
+  ProgressThreadClear();
   pthread_cond_signal(&progress.ends);
   pthread_mutex_unlock(&progress.lock);
   pthread_join(progress.thread, NULL);

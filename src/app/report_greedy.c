@@ -5,7 +5,7 @@
 #include <string.h>
 
 /* Appends formatted text to the table. */
-static PetscErrorCode Append(GreedyLog *log, const char text[])
+static PetscErrorCode GreedyReportAppend(GreedyLog *log, const char text[])
 {
   const size_t length = strlen(text);
 
@@ -51,18 +51,18 @@ static PetscErrorCode BeginTable(GreedyLog *log)
   const char *const *names;
 
   PetscFunctionBegin;
-  PetscCall(Append(log, "iteration,snapshots,modes,rid_nodes,rid_elements,"));
+  PetscCall(GreedyReportAppend(log, "iteration,snapshots,modes,rid_nodes,rid_elements,"));
   PetscCall(HycoSceneGetParameters(log->scene, &n, &names, NULL, NULL));
   for (PetscInt p = 0; p < n; p++) {
-    PetscCall(Append(log, names[p]));
-    PetscCall(Append(log, ","));
+    PetscCall(GreedyReportAppend(log, names[p]));
+    PetscCall(GreedyReportAppend(log, ","));
   }
-  PetscCall(Append(log, "eta,eta_u,eta_lambda,max_eta,mean_eta_u,mean_eta_lambda,infinite,seconds\n"));
+  PetscCall(GreedyReportAppend(log, "eta,eta_u,eta_lambda,max_eta,mean_eta_u,mean_eta_lambda,infinite,seconds\n"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* A HycoGreedyMonitor: prints a line, and writes the table again with its row. */
-static PetscErrorCode Monitor(const HycoGreedyStep *s, void *ctx)
+static PetscErrorCode GreedyReportMonitor(const HycoGreedyStep *s, void *ctx)
 {
   GreedyLog *log = (GreedyLog *)ctx;
   char words[DRIVER_LINE], columns[DRIVER_LINE], row[3 * DRIVER_LINE];
@@ -81,7 +81,7 @@ static PetscErrorCode Monitor(const HycoGreedyStep *s, void *ctx)
            (double)s->mean_eta_lambda, (int)s->n_infinite, (double)s->seconds);
   /* The head with the first row, when the scene's parameters are certainly known. */
   if (!log->length) PetscCall(BeginTable(log));
-  PetscCall(Append(log, row));
+  PetscCall(GreedyReportAppend(log, row));
   if (log->table[0]) PetscCall(DriverWriteText(log->table, log->text));
   log->iterations = s->iteration;
   log->max_eta = s->max_eta;
@@ -113,7 +113,7 @@ PetscErrorCode DriverReadGreedy(HycoScene scene, HycoReducer reducer, HycoSample
   HycoCheck(target > 0, "-target is 0; the target of the greedy indicator must be positive, for example 1e-3");
   log->target = target;
   PetscCall(HycoReducerSetGreedyStop(reducer, target, max_snapshots, max_seconds));
-  PetscCall(HycoReducerSetGreedyMonitor(reducer, Monitor, log));
+  PetscCall(HycoReducerSetGreedyMonitor(reducer, GreedyReportMonitor, log));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -35,7 +35,7 @@ PetscErrorCode DriverReadTargets(Search *s)
 }
 
 /* "1.2e-03", or "inf": a solve did not converge, or x/0. */
-static void Number(PetscReal value, char text[32])
+static void TrainingReportFormat(PetscReal value, char text[32])
 {
   if (value > PETSC_MAX_REAL / 8)
     snprintf(text, 32, "inf");
@@ -78,7 +78,7 @@ static PetscInt CountKinds(const Search *s)
 }
 
 /* The table is kept as text and written anew after each attempt: a run that ends early leaves the rows so far. */
-static PetscErrorCode Append(Search *s, const char text[])
+static PetscErrorCode TrainingReportAppend(Search *s, const char text[])
 {
   const size_t n = strlen(text);
 
@@ -103,15 +103,15 @@ static PetscErrorCode AppendRow(Search *s, const HycoAttempt *a)
 
   PetscFunctionBegin;
   if (!s->length) {
-    PetscCall(Append(
+    PetscCall(TrainingReportAppend(
         s,
         "attempt,training_points,model_type,variant,pod_tol,rid_layers,rid_contact_extension,hybrid,rid_whole,n_modes,"
         "rid_elements,rid_fraction,held_out_points"));
     for (PetscInt j = 0; j < CountKinds(s); j++) {
       snprintf(row, sizeof(row), ",error_%s,median_%s", HycoErrorKinds[j], HycoErrorKinds[j]);
-      PetscCall(Append(s, row));
+      PetscCall(TrainingReportAppend(s, row));
     }
-    PetscCall(Append(s, ",not_converged,seconds,operations,meets,failure\n"));
+    PetscCall(TrainingReportAppend(s, ",not_converged,seconds,operations,meets,failure\n"));
   }
   /* No model, or one that was not judged: NaN, not 0. */
   none = (PetscBool)(a->failure[0] || !a->held_out.n);
@@ -120,20 +120,20 @@ static PetscErrorCode AppendRow(Search *s, const HycoAttempt *a)
                         (double)r->contact_extension, HycoHybrids[r->hybrid], (int)r->whole, (int)a->n_modes,
                         (int)a->rid_elements, (double)a->rid_fraction, a->failure[0] ? 0 : (int)a->held_out.n);
   for (PetscInt j = 0; j < 2 * CountKinds(s); j++) {
-    Number(none ? (PetscReal)NAN : (j % 2 ? a->held_out.median : a->held_out.largest)[j / 2], number);
+    TrainingReportFormat(none ? (PetscReal)NAN : (j % 2 ? a->held_out.median : a->held_out.largest)[j / 2], number);
     at += (size_t)snprintf(row + at, sizeof(row) - at, ",%s", number);
   }
   at += (size_t)snprintf(row + at, sizeof(row) - at, ",%d,%.6g,%.6g,%d,\"", (int)a->held_out.not_converged,
                          none ? NAN : (double)a->held_out.seconds, (double)a->cost, a->ratio <= 1);
   for (const char *c = a->failure; *c && at + 4 < sizeof(row); c++) row[at++] = *c == '"' ? '\'' : *c;
   snprintf(row + at, sizeof(row) - at, "\"\n");
-  PetscCall(Append(s, row));
+  PetscCall(TrainingReportAppend(s, row));
   if (s->table[0]) PetscCall(DriverWriteText(s->table, s->text));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* "; meets the targets" or "; accurate enough", or where and why the attempt was dropped: " at 2 of 20 points, and dropped beside settings
-   1: ...". */
+/* "; meets the targets" or "; accurate enough", or where and why the attempt was dropped: " at 2 of 20 points, and
+   dropped beside settings 1: ...". */
 static PetscErrorCode DescribeEnd(const Search *s, const HycoAttempt *a, char text[DRIVER_LINE])
 {
   PetscFunctionBegin;
@@ -199,7 +199,7 @@ static PetscErrorCode PrintFaster(const Search *s, const HycoTraining *t)
 }
 
 /* A HycoAttemptMonitor. Rank 0: HycoAttemptMonitor is called there only. */
-static PetscErrorCode Attempted(const HycoAttempt *a, void *ctx)
+static PetscErrorCode TrainingReportAttempted(const HycoAttempt *a, void *ctx)
 {
   Search *s = (Search *)ctx;
   char what[DRIVER_LINE], errors[DRIVER_LINE], end[DRIVER_LINE];
@@ -223,7 +223,7 @@ static PetscErrorCode Attempted(const HycoAttempt *a, void *ctx)
 }
 
 /* A HycoAddedMonitor. */
-static PetscErrorCode Added(PetscInt n, PetscInt parameter, PetscBool former, void *ctx)
+static PetscErrorCode TrainingReportAdded(PetscInt n, PetscInt parameter, PetscBool former, void *ctx)
 {
   Search *s = (Search *)ctx;
   const char *const *names;
@@ -253,13 +253,13 @@ PetscErrorCode DriverSetSearch(Search *s, HycoScene scene, HycoReducer reducer, 
   s->n_points = n_points;
   PetscCall(HycoReducerSetTargets(reducer, s->target, s->budget));
   PetscCall(HycoReducerGetTargets(reducer, s->aim, s->limit));
-  PetscCall(HycoReducerSetAttemptMonitor(reducer, Attempted, Added, s));
+  PetscCall(HycoReducerSetAttemptMonitor(reducer, TrainingReportAttempted, TrainingReportAdded, s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Reports targets that are not met: a line and the exit status of a miss. One line for each error above its limit,
    each with what the user can do. */
-static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
+static PetscErrorCode TrainingReportMisses(const Search *s, const HycoTraining *t)
 {
   const PetscReal *limit = s->limit;
 
@@ -367,7 +367,7 @@ PetscErrorCode DriverJudgeModel(const Search *s, const HycoTraining *t)
   if (!t->n_held)
     PetscCall(DriverPrint("the model does not estimate its errors: fewer than 10 predictions of held-out solutions\n"));
   PetscCall(PrintFaster(s, t));
-  PetscCall(Misses(s, t));
+  PetscCall(TrainingReportMisses(s, t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

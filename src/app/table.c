@@ -47,7 +47,7 @@ DriverRows DriverRowsOfRoot(PetscInt n, PetscInt width, PetscReal value[], Drive
 }
 
 /* PETSc's infinity is a large number; in a table it is infinite. */
-static double Infinite(PetscReal value)
+static double TableInfinite(PetscReal value)
 {
   return value > PETSC_MAX_REAL / 8 ? HUGE_VAL : (double)value;
 }
@@ -61,7 +61,7 @@ static size_t FormatRow(const Table *t, PetscInt k, const PetscReal value[], cha
   for (PetscInt p = 0; p < t->n_par; p++)
     at += (size_t)snprintf(text + at, room - at, "%.10g,", (double)t->mu[k * t->n_par + p]);
   for (PetscInt c = 0; c < width; c++)
-    at += (size_t)snprintf(text + at, room - at, "%.8g%c", Infinite(value[c]), c < width - 1 ? ',' : '\n');
+    at += (size_t)snprintf(text + at, room - at, "%.8g%c", TableInfinite(value[c]), c < width - 1 ? ',' : '\n');
   return at;
 }
 
@@ -151,7 +151,7 @@ static PetscErrorCode WriteColumn(HycoH5 file, const Table *t, PetscInt rounds, 
 
     PetscCall(PetscMalloc1(p->n, &column));
     for (PetscInt k = 0; k < p->n; k++)
-      column[k] = par < 0 ? Infinite(p->value[(size_t)k * (size_t)rows->width + (size_t)c])
+      column[k] = par < 0 ? TableInfinite(p->value[(size_t)k * (size_t)rows->width + (size_t)c])
                           : t->mu[(p->first + k) * t->n_par + par];
     PetscCall(HycoH5WriteRows(file, par < 0 ? t->names[c] : t->par[par], MPIU_REAL, rows->n, HYCO_H5_LINE, p->first,
                               p->n, column));

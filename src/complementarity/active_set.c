@@ -44,7 +44,8 @@ static PetscErrorCode SetHash(const HycoActiveSet *e, const PetscBool active[], 
 }
 
 /* Whether the set occurred before; stores it as that of iteration `its`. */
-static PetscErrorCode Met(const HycoActiveSet *e, const PetscBool active[], PetscInt its, History *h, PetscBool *met)
+static PetscErrorCode ActiveSetRepeats(const HycoActiveSet *e, const PetscBool active[], PetscInt its, History *h,
+                                       PetscBool *met)
 {
   PetscFunctionBegin;
   HycoGrow(its, h->room, h->past);
@@ -56,7 +57,7 @@ static PetscErrorCode Met(const HycoActiveSet *e, const PetscBool active[], Pets
 }
 
 /* Reduces over the ranks that share the contacts. */
-static PetscErrorCode Reduce(const HycoActiveSet *e, MPI_Op op, PetscInt *value)
+static PetscErrorCode ActiveSetReduce(const HycoActiveSet *e, MPI_Op op, PetscInt *value)
 {
   PetscFunctionBegin;
   if (e->comm != MPI_COMM_NULL) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, 1, MPIU_INT, op, e->comm));
@@ -65,7 +66,7 @@ static PetscErrorCode Reduce(const HycoActiveSet *e, MPI_Op op, PetscInt *value)
 
 /* Changes every contact with a violation; after a cycle only the last of them, which terminates in exact arithmetic
    (K. G. Murty's least index rule). */
-static PetscErrorCode Change(const HycoActiveSet *e, const History *h, PetscBool active[], PetscInt *changes)
+static PetscErrorCode ActiveSetChange(const HycoActiveSet *e, const History *h, PetscBool active[], PetscInt *changes)
 {
   PetscInt last = -1;
 
@@ -74,20 +75,20 @@ static PetscErrorCode Change(const HycoActiveSet *e, const History *h, PetscBool
   if (h->one) {
     /* Numbers over all ranks: which contact changes does not depend on the partition. */
     for (PetscInt i = 0; i < e->n; i++) last = h->violates[i] ? e->first + i : last;
-    PetscCall(Reduce(e, MPI_MAX, &last));
+    PetscCall(ActiveSetReduce(e, MPI_MAX, &last));
   }
   for (PetscInt i = 0; i < e->n; i++) {
     if (!h->violates[i] || (h->one && e->first + i != last)) continue;
     active[i] = (PetscBool)!active[i];
     (*changes)++;
   }
-  PetscCall(Reduce(e, MPI_SUM, changes));
+  PetscCall(ActiveSetReduce(e, MPI_SUM, changes));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* One iteration. */
-static PetscErrorCode Step(const HycoActiveSet *e, PetscInt its, History *h, PetscBool active[], PetscInt *changes,
-                           PetscBool *singular)
+static PetscErrorCode ActiveSetStep(const HycoActiveSet *e, PetscInt its, History *h, PetscBool active[],
+                                    PetscInt *changes, PetscBool *singular)
 {
   PetscInt n_active = 0;
 
@@ -98,8 +99,8 @@ static PetscErrorCode Step(const HycoActiveSet *e, PetscInt its, History *h, Pet
   PetscCall(e->violations(e->ctx, active, h->violates));
   /* Counted for a monitor alone. */
   for (PetscInt i = 0; e->monitor && i < e->n; i++) n_active += active[i];
-  if (e->monitor) PetscCall(Reduce(e, MPI_SUM, &n_active));
-  PetscCall(Change(e, h, active, changes));
+  if (e->monitor) PetscCall(ActiveSetReduce(e, MPI_SUM, &n_active));
+  PetscCall(ActiveSetChange(e, h, active, changes));
   if (e->monitor) PetscCall(e->monitor(its, n_active, *changes, e->monitor_ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -121,7 +122,7 @@ PetscErrorCode HycoActiveSetRun(const HycoActiveSet *e, PetscBool active[], Pets
     if (e->restart) PetscCall(e->restart(e->ctx, *its, active, &more));
     /* A fresh set starts a new history. */
     if (more) h.since = *its;
-    PetscCall(Met(e, active, *its, &h, &met));
+    PetscCall(ActiveSetRepeats(e, active, *its, &h, &met));
     if (met && !e->one_by_one) {
       *status = HYCO_LCP_CYCLE;
       break;
@@ -132,7 +133,7 @@ PetscErrorCode HycoActiveSetRun(const HycoActiveSet *e, PetscBool active[], Pets
       h.since = *its;
     }
     (*its)++;
-    PetscCall(Step(e, *its, &h, active, &changes, &singular));
+    PetscCall(ActiveSetStep(e, *its, &h, active, &changes, &singular));
     if (singular) *status = HYCO_LCP_SINGULAR;
     /* Singular: the status ends the loop. Changes: the next set is solved. */
     if (singular || changes) continue;

@@ -1,8 +1,8 @@
 /*
-  Whether forces of the cones balance a load on the motions of floating bodies: min |A r - f|, A the rows of the motions. Each
-  step takes from every cone the ray that works most against the motion f - A r, and solves the nonnegative least-squares
-  problem of these rays and of those with a force (fully corrective conditional gradients: M. Jaggi, Proc. ICML 28 (2013)
-  427-435). If no ray works against it, the bodies move so.
+  Whether forces of the cones balance a load on the motions of floating bodies: min |A r - f|, A the rows of the
+  motions. Each step takes from every cone the ray that works most against the motion f - A r, and solves the
+  nonnegative least-squares problem of these rays and of those with a force (fully corrective conditional gradients: M.
+  Jaggi, Proc. ICML 28 (2013) 427-435). If no ray works against it, the bodies move so.
 */
 #include <hycoalgorithms.h>
 #include <hycolcp.h>
@@ -47,8 +47,8 @@ static PetscErrorCode HaveRays(const HycoBlocks *b, PetscBool *have)
 }
 
 /* The ray of block k that works most against the motion d: its work, and length. */
-static void Best(const HycoBlocks *b, PetscInt k, PetscInt p, const PetscReal A[], const PetscReal d[], PetscReal ray[],
-                 PetscReal *work, PetscReal *length)
+static void BalanceBest(const HycoBlocks *b, PetscInt k, PetscInt p, const PetscReal A[], const PetscReal d[],
+                        PetscReal ray[], PetscReal *work, PetscReal *length)
 {
   const PetscInt size = b->row[k + 1] - b->row[k];
   const PetscReal mu = size > 1 ? b->data[b->at[k]] : 0;
@@ -68,8 +68,8 @@ static void Best(const HycoBlocks *b, PetscInt k, PetscInt p, const PetscReal A[
 }
 
 /* Keeps the rays with a force, and adds the best of each block; *against: one of them works against d. */
-static void Renew(const HycoBlocks *b, PetscInt p, const PetscReal A[], const PetscReal d[], Rays *rays,
-                  PetscBool *against)
+static void BalanceRenew(const HycoBlocks *b, PetscInt p, const PetscReal A[], const PetscReal d[], Rays *rays,
+                         PetscBool *against)
 {
   PetscReal size = 0;
   PetscInt kept = 0;
@@ -87,7 +87,7 @@ static void Renew(const HycoBlocks *b, PetscInt p, const PetscReal A[], const Pe
   for (PetscInt k = 0; k < b->n; k++) {
     PetscReal *ray = rays->ray + kept * HYCO_MAX_BLOCK, *column = rays->column + kept * p, work, length;
 
-    Best(b, k, p, A, d, ray, &work, &length);
+    BalanceBest(b, k, p, A, d, ray, &work, &length);
     if (!(work > AGAINST * length * size)) continue;
     *against = PETSC_TRUE;
     for (PetscInt i = 0; i < p; i++) {
@@ -119,7 +119,7 @@ PetscErrorCode HycoBlocksBalance(const HycoBlocks *b, PetscInt p, const PetscRea
   rest = size = PetscSqrtReal(size);
   least = PetscMax(BALANCED * size, rounding);
   for (PetscInt k = 0; k < MOST_STEPS && known && rest > least; k++) {
-    Renew(b, p, A, d, &rays, &against);
+    BalanceRenew(b, p, A, d, &rays, &against);
     if (!against) break;
     PetscCall(HycoNNLS(p, rays.n, rays.column, f, rays.force, &rest));
     PetscCall(PetscArraycpy(d, f, p));

@@ -2,7 +2,7 @@
 #include <hycoconeimpl.h>
 
 /* The blocks' cones must be usable here; `of` NULL: all blocks have the first one. */
-static PetscErrorCode Check(PetscInt n_cones, const HycoCone cones[], PetscInt n, const PetscInt of[])
+static PetscErrorCode BlocksCheck(PetscInt n_cones, const HycoCone cones[], PetscInt n, const PetscInt of[])
 {
   PetscFunctionBegin;
   PetscCheck(n_cones >= 1 && n >= 0, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
@@ -26,7 +26,7 @@ PetscErrorCode HycoBlocksCreate(PetscInt n_cones, const HycoCone cones[], PetscI
   HycoBlocks *b;
 
   PetscFunctionBegin;
-  PetscCall(Check(n_cones, cones, n, of));
+  PetscCall(BlocksCheck(n_cones, cones, n, of));
   PetscCall(PetscNew(&b));
   HycoDuplicate(n_cones, cones, &b->cone);
   b->n_cones = n_cones;
@@ -121,7 +121,7 @@ PetscErrorCode HycoBlocksAdmit(const HycoBlocks *b, PetscReal r[])
 }
 
 /* max(most, value); a value that is not finite is the largest. */
-static PetscReal Most(PetscReal most, PetscReal value)
+static PetscReal BlocksMaximum(PetscReal most, PetscReal value)
 {
   return value <= PETSC_MAX_REAL ? PetscMax(most, value) : PETSC_MAX_REAL;
 }
@@ -143,10 +143,10 @@ PetscErrorCode HycoBlocksNaturalMap(const HycoBlocks *b, PetscReal rho, const Pe
     PetscCall(HycoBlockProject(b, k, y, z));
     PetscCall(HycoBlockProject(b, k, r + first, own));
     /* The first component is the normal force: by how much the law would raise it, where contacts penetrate. */
-    map->missing = Most(map->missing, z[0] - r[first]);
+    map->missing = BlocksMaximum(map->missing, z[0] - r[first]);
     for (PetscInt i = 0; i < size; i++) {
-      map->map = Most(map->map, PetscAbsReal(z[i] - r[first + i]));
-      map->outside = Most(map->outside, PetscAbsReal(own[i] - r[first + i]));
+      map->map = BlocksMaximum(map->map, PetscAbsReal(z[i] - r[first + i]));
+      map->outside = BlocksMaximum(map->outside, PetscAbsReal(own[i] - r[first + i]));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -47,7 +47,7 @@ void HycoSetFactorForget(HycoSetFactor factor)
 
 /* Drops the first contact that is not in the set and all after it, and appends the other contacts of the set:
    returns their number; f->k of them are factored. */
-static PetscInt Rearrange(HycoSetFactor f, PetscInt k, const PetscInt a[])
+static PetscInt CholeskyRearrange(HycoSetFactor f, PetscInt k, const PetscInt a[])
 {
   PetscInt stay = 0, count;
 
@@ -72,7 +72,8 @@ static PetscInt Rearrange(HycoSetFactor f, PetscInt k, const PetscInt a[])
 }
 
 /* Computes rows f->k .. k - 1 of the factor; *regular: no pivot below `tol` of its diagonal entry. */
-static PetscErrorCode Append(HycoSetFactor f, const PetscReal M[], PetscInt k, PetscReal tol, PetscBool *regular)
+static PetscErrorCode CholeskyAppend(HycoSetFactor f, const PetscReal M[], PetscInt k, PetscReal tol,
+                                     PetscBool *regular)
 {
   const PetscReal one = 1, minus = -1;
   const size_t n = (size_t)f->n, done = (size_t)f->k;
@@ -113,12 +114,12 @@ static PetscErrorCode Append(HycoSetFactor f, const PetscReal M[], PetscInt k, P
 PetscErrorCode HycoSetFactorSolve(HycoSetFactor f, const PetscReal M[], const PetscReal q[], PetscInt k,
                                   const PetscInt a[], PetscReal tol, PetscReal z[], PetscBool *regular)
 {
-  const PetscInt count = Rearrange(f, k, a);
+  const PetscInt count = CholeskyRearrange(f, k, a);
   PetscBLASInt n, ld, one = 1, info;
 
   PetscFunctionBegin;
   *regular = PETSC_TRUE;
-  if (count > f->k) PetscCall(Append(f, M, count, tol, regular));
+  if (count > f->k) PetscCall(CholeskyAppend(f, M, count, tol, regular));
   if (!*regular) PetscFunctionReturn(PETSC_SUCCESS);
   /* In the order of the factor: f->a has all k contacts of the set, since count = k. */
   for (PetscInt j = 0; j < k; j++) f->x[j] = -q[f->a[j]];
@@ -133,7 +134,8 @@ PetscErrorCode HycoSetFactorSolve(HycoSetFactor f, const PetscReal M[], const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* potrf accepts pivots of round-off size, whose solutions would be noise of any size. The comparison is false for NaN. */
+/* potrf accepts pivots of round-off size, whose solutions would be noise of any size. The comparison is false for
+   NaN. */
 PetscErrorCode HycoCholesky(const char triangle[], PetscInt n, PetscReal A[], const PetscReal scale[],
                             PetscBool *regular)
 {

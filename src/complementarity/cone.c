@@ -104,7 +104,7 @@ HycoDefineViewFromOptions(HycoCone, HYCO_CONE_CLASSID)
 /* -- each component is nonnegative -- */
 
 /* The nearest point of the orthant. */
-static PetscErrorCode Project(HycoCone cone, const PetscReal data[], const PetscReal y[], PetscReal z[])
+static PetscErrorCode ConeProject(HycoCone cone, const PetscReal data[], const PetscReal y[], PetscReal z[])
 {
   PetscFunctionBegin;
   (void)data;
@@ -113,7 +113,7 @@ static PetscErrorCode Project(HycoCone cone, const PetscReal data[], const Petsc
 }
 
 /* At 0 the derivative of the open side: the contact counts as open. */
-static PetscErrorCode Derivative(HycoCone cone, const PetscReal data[], const PetscReal y[], PetscReal J[])
+static PetscErrorCode ConeDerivative(HycoCone cone, const PetscReal data[], const PetscReal y[], PetscReal J[])
 {
   PetscFunctionBegin;
   (void)data;
@@ -125,7 +125,7 @@ static PetscErrorCode Derivative(HycoCone cone, const PetscReal data[], const Pe
 /* The flag lets blocks that are all of this kind be treated as none, by the active set and TAO. */
 PetscErrorCode HycoConeCreate_Nonnegative(HycoCone cone)
 {
-  const struct _HycoConeOps ops = {.project = Project, .derivative = Derivative};
+  const struct _HycoConeOps ops = {.project = ConeProject, .derivative = ConeDerivative};
 
   PetscFunctionBegin;
   PetscCall(HycoConeSetOps(cone, &ops, 0));

@@ -1,13 +1,14 @@
 /*
-  The derivative of a solution of w = q + M z, z = P(z - rho w) with Coulomb's friction, where q and the coefficients change:
+  The derivative of a solution of w = q + M z, z = P(z - rho w) with Coulomb's friction, where q and the coefficients
+  change:
 
       z' = DP (z' - rho (q' + M z')) + g,     w' = q' + M z',
 
-  g: along a slip mu' r_n. DP g = 0, so that z' - g solves the same system with q' + M g. Contacts on the border of two states
-  serve if the derivative keeps them there, as where loads stay.
+  g: along a slip mu' r_n. DP g = 0, so that z' - g solves the same system with q' + M g. Contacts on the border of two
+  states serve if the derivative keeps them there, as where loads stay.
 
-  Where nothing loads floating bodies, they are where the contacts slip least since the step before, moved on by as little as
-  opens what would overlap (semismooth.c): x = x_s + d, of least squares of the rows of both sets.
+  Where nothing loads floating bodies, they are where the contacts slip least since the step before, moved on by as
+  little as opens what would overlap (semismooth.c): x = x_s + d, of least squares of the rows of both sets.
 */
 #include <hycolcp.h>
 #include <petscblaslapack.h>
@@ -18,7 +19,7 @@
 #define MEETS   1e-6  /* the same, of gaps that stay closed without a force */
 #define RANK    1e-10 /* singular values relative to the largest that count as 0 */
 
-static PetscReal Largest(PetscInt n, const PetscReal v[])
+static PetscReal ConeTangentLargest(PetscInt n, const PetscReal v[])
 {
   PetscReal most = 0;
 
@@ -27,7 +28,7 @@ static PetscReal Largest(PetscInt n, const PetscReal v[])
 }
 
 /* Norm of the tangential components of a block. */
-static PetscReal Along(PetscInt size, const PetscReal v[])
+static PetscReal TangentialNorm(PetscInt size, const PetscReal v[])
 {
   PetscReal sum = 0;
 
@@ -36,7 +37,7 @@ static PetscReal Along(PetscInt size, const PetscReal v[])
 }
 
 /* The coefficient of a block: 0 without friction. */
-static PetscReal Coefficient(const HycoBlocks *b, PetscInt k)
+static PetscReal ConeTangentCoefficient(const HycoBlocks *b, PetscInt k)
 {
   return b->row[k + 1] - b->row[k] > 1 ? b->data[b->at[k]] : 0;
 }
@@ -45,7 +46,7 @@ static PetscReal Coefficient(const HycoBlocks *b, PetscInt k)
 static void AddFriction(PetscInt size, const PetscReal piece[], PetscReal mu, PetscReal d, const PetscReal r[],
                         const PetscReal w[], PetscReal g[])
 {
-  const PetscReal slip = Along(size, w);
+  const PetscReal slip = TangentialNorm(size, w);
   PetscBool slips = PETSC_FALSE;
 
   for (PetscInt i = 1; i < size; i++) slips = (PetscBool)(slips || piece[i * size] != 0);
@@ -62,18 +63,18 @@ typedef struct {
 } Scales;
 
 /* Whether the derivative keeps a block on the border of two states in both. d: of its coefficient. */
-static PetscBool Keeps(PetscInt size, PetscReal mu, PetscReal d, const Scales *s, const PetscReal r[],
-                       const PetscReal w[], const PetscReal dr[], const PetscReal dw[])
+static PetscBool ConeTangentKeepsState(PetscInt size, PetscReal mu, PetscReal d, const Scales *s, const PetscReal r[],
+                                       const PetscReal w[], const PetscReal dr[], const PetscReal dw[])
 {
-  const PetscReal force = Along(size, r);
+  const PetscReal force = TangentialNorm(size, r);
   PetscReal change = d * r[0] + mu * dr[0];
 
   if (r[0] <= CLOSED * s->force && w[0] <= CLOSED * s->gap)
     return (PetscBool)(PetscAbsReal(dr[0]) <= CHANGES * s->rate_r && PetscAbsReal(dw[0]) <= CHANGES * s->rate_w);
   if (size == 1 || r[0] <= CLOSED * s->force) return PETSC_TRUE;
-  if (force < (1 - BORDER) * mu * r[0] || Along(size, w) > BORDER * s->gap) return PETSC_TRUE;
+  if (force < (1 - BORDER) * mu * r[0] || TangentialNorm(size, w) > BORDER * s->gap) return PETSC_TRUE;
   for (PetscInt i = 1; i < size && force > 0; i++) change -= r[i] / force * dr[i];
-  return (PetscBool)(PetscAbsReal(change) <= CHANGES * s->rate_r && Along(size, dw) <= CHANGES * s->rate_w);
+  return (PetscBool)(PetscAbsReal(change) <= CHANGES * s->rate_r && TangentialNorm(size, dw) <= CHANGES * s->rate_w);
 }
 
 /* Whether a row of M is 0: its contact has no unknown. */
@@ -86,7 +87,8 @@ static PetscBool IsEmpty(PetscInt N, const PetscReal M[], PetscInt row)
 }
 
 /* x (p) of least squares of G x = target in m rows, G the first p columns of M. */
-static PetscErrorCode Fit(const HycoLCP *lcp, PetscInt m, const PetscInt row[], const PetscReal target[], PetscReal x[])
+static PetscErrorCode ConeTangentFit(const HycoLCP *lcp, PetscInt m, const PetscInt row[], const PetscReal target[],
+                                     PetscReal x[])
 {
   const PetscInt p = lcp->p, N = p + lcp->n;
   const PetscBLASInt rows = (PetscBLASInt)PetscMax(m, p), columns = (PetscBLASInt)p, one = 1;
@@ -107,7 +109,7 @@ static PetscErrorCode Fit(const HycoLCP *lcp, PetscInt m, const PetscInt row[], 
 }
 
 /* y = f + a G x in the rows of contacts. */
-static void Move(const HycoLCP *lcp, PetscReal a, const PetscReal x[], const PetscReal f[], PetscReal y[])
+static void ConeTangentMove(const HycoLCP *lcp, PetscReal a, const PetscReal x[], const PetscReal f[], PetscReal y[])
 {
   const PetscInt p = lcp->p, N = p + lcp->n;
 
@@ -118,19 +120,20 @@ static void Move(const HycoLCP *lcp, PetscReal a, const PetscReal x[], const Pet
 }
 
 /* The derivative of the motions without forces; before: the forces of the step before. */
-static PetscErrorCode Rest(const HycoLCP *lcp, const PetscReal before[], const PetscReal z[], const PetscReal w[],
-                           PetscReal size, const PetscReal dq[], PetscReal dz[], PetscBool *regular)
+static PetscErrorCode ConeTangentAtRest(const HycoLCP *lcp, const PetscReal before[], const PetscReal z[],
+                                        const PetscReal w[], PetscReal size, const PetscReal dq[], PetscReal dz[],
+                                        PetscBool *regular)
 {
   const HycoBlocks *b = lcp->blocks;
   const PetscInt p = lcp->p, n = lcp->n, N = p + n;
-  const PetscReal rate = Largest(n, dq + p);
+  const PetscReal rate = ConeTangentLargest(n, dq + p);
   PetscInt *slips, *closed, n_slips = 0, n_closed = 0;
   PetscReal *t, *x, *dx, moved = 0;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(n + 1, &slips, n + 1, &closed));
   PetscCall(PetscCalloc3(N + 1, &t, p, &x, p, &dx));
-  for (PetscInt k = 0; k < b->n && Largest(n, before) > 0; k++) {
+  for (PetscInt k = 0; k < b->n && ConeTangentLargest(n, before) > 0; k++) {
     for (PetscInt i = b->row[k]; i < b->row[k + 1]; i++) {
       if (i > b->row[k] || before[i] > 0) slips[n_slips++] = p + i;
     }
@@ -139,23 +142,23 @@ static PetscErrorCode Rest(const HycoLCP *lcp, const PetscReal before[], const P
     if (w[p + b->row[k]] <= CLOSED * size) closed[n_closed++] = p + b->row[k];
   }
   /* Without forces w = q + G x. */
-  Move(lcp, -1, z, w, t);
+  ConeTangentMove(lcp, -1, z, w, t);
   for (PetscInt i = p; i < N; i++) t[i] = -t[i];
-  if (n_slips) PetscCall(Fit(lcp, n_slips, slips, t, x));
+  if (n_slips) PetscCall(ConeTangentFit(lcp, n_slips, slips, t, x));
   for (PetscInt i = p; i < N; i++) t[i] = -dq[i];
-  if (n_slips) PetscCall(Fit(lcp, n_slips, slips, t, dz));
+  if (n_slips) PetscCall(ConeTangentFit(lcp, n_slips, slips, t, dz));
   for (PetscInt c = 0; c < p; c++) x[c] = z[c] - x[c];
-  Move(lcp, 1, x, t, t);
+  ConeTangentMove(lcp, 1, x, t, t);
   for (PetscInt i = p; i < N; i++) moved = PetscMax(moved, PetscAbsReal(t[i] + dq[i]));
   for (PetscInt i = p; i < N; i++) t[i] = -dq[i];
-  Move(lcp, -1, dz, t, t);
+  ConeTangentMove(lcp, -1, dz, t, t);
   if (moved > CLOSED * size) {
     /* What has moved the bodies on would overlap without that, and just touches. */
     *regular = (PetscBool)(n_closed > 0);
-    if (n_closed) PetscCall(Fit(lcp, n_closed, closed, t, dx));
+    if (n_closed) PetscCall(ConeTangentFit(lcp, n_closed, closed, t, dx));
   }
   for (PetscInt c = 0; c < p; c++) dz[c] += dx[c];
-  Move(lcp, -1, dx, t, t);
+  ConeTangentMove(lcp, -1, dx, t, t);
   for (PetscInt i = 0; i < n_closed; i++)
     *regular = (PetscBool)(*regular && PetscAbsReal(t[closed[i]]) <= MEETS * rate);
   PetscCall(PetscFree2(slips, closed));
@@ -171,7 +174,7 @@ PetscErrorCode HycoConeTangent(const HycoLCP *lcp, const PetscReal before[], con
   const HycoBlocks *b = lcp->blocks;
   const PetscInt p = lcp->p, n = lcp->n, N = p + n;
   const PetscReal *pieces;
-  Scales s = {Largest(n, z + p), size, 0, Largest(n, dq + p)};
+  Scales s = {ConeTangentLargest(n, z + p), size, 0, ConeTangentLargest(n, dq + p)};
   PetscInt room;
   PetscReal *g;
 
@@ -181,9 +184,9 @@ PetscErrorCode HycoConeTangent(const HycoLCP *lcp, const PetscReal before[], con
   PetscCall(PetscArraycpy(dw, dq, N));
   if (p && !lcp->springs && s.force == 0) {
     /* A load that appears would close contacts on one side alone. */
-    *regular = (PetscBool)(Largest(p, dq) == 0);
-    if (*regular) PetscCall(Rest(lcp, before, z, w, size, dq, dz, regular));
-    Move(lcp, 1, dz, dw, dw);
+    *regular = (PetscBool)(ConeTangentLargest(p, dq) == 0);
+    if (*regular) PetscCall(ConeTangentAtRest(lcp, before, z, w, size, dq, dz, regular));
+    ConeTangentMove(lcp, 1, dz, dw, dw);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   HycoConeFactorSetBlocks(lcp->cone, b);
@@ -193,21 +196,22 @@ PetscErrorCode HycoConeTangent(const HycoLCP *lcp, const PetscReal before[], con
     const PetscInt at = p + b->row[k];
 
     if (dmu[k] != 0)
-      AddFriction(b->row[k + 1] - b->row[k], pieces + (size_t)k * (size_t)(room / b->n), Coefficient(b, k), dmu[k],
-                  z + at, w + at, g + at);
+      AddFriction(b->row[k + 1] - b->row[k], pieces + (size_t)k * (size_t)(room / b->n), ConeTangentCoefficient(b, k),
+                  dmu[k], z + at, w + at, g + at);
   }
-  if (Largest(N, g) > 0) PetscCall(HycoAddDenseProduct(N, lcp->M, g, dq));
-  if (Largest(N, dq) > 0) PetscCall(HycoConeFactorTangent(lcp->cone, 1, dq, dz, regular));
+  if (ConeTangentLargest(N, g) > 0) PetscCall(HycoAddDenseProduct(N, lcp->M, g, dq));
+  if (ConeTangentLargest(N, dq) > 0) PetscCall(HycoConeFactorTangent(lcp->cone, 1, dq, dz, regular));
   for (PetscInt i = 0; i < N; i++) dz[i] += g[i];
   PetscCall(PetscFree(g));
   if (!*regular) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoAddDenseProduct(N, lcp->M, dz, dw));
-  s.rate_r = Largest(n, dz + p);
-  s.rate_w = PetscMax(s.rate_w, Largest(n, dw + p));
+  s.rate_r = ConeTangentLargest(n, dz + p);
+  s.rate_w = PetscMax(s.rate_w, ConeTangentLargest(n, dw + p));
   for (PetscInt k = 0; k < b->n && *regular; k++) {
     const PetscInt at = p + b->row[k];
 
-    *regular = Keeps(b->row[k + 1] - b->row[k], Coefficient(b, k), dmu[k], &s, z + at, w + at, dz + at, dw + at);
+    *regular = ConeTangentKeepsState(b->row[k + 1] - b->row[k], ConeTangentCoefficient(b, k), dmu[k], &s, z + at,
+                                     w + at, dz + at, dw + at);
     if (!*regular) *regular = IsEmpty(N, lcp->M, at);
   }
   PetscFunctionReturn(PETSC_SUCCESS);

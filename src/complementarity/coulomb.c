@@ -1,22 +1,23 @@
 /*
-  Coulomb's law as a cone: with the trial forces y = r - rho w the radius of the disk of tangential forces is mu P_+(y_n),
+  Coulomb's law as a cone: with the trial forces y = r - rho w the radius of the disk of tangential forces is mu
+  P_+(y_n),
 
     P(y) = (y_n^+, y_t min(1, R / |y_t|)),     R = mu y_n^+ + g.
 
-  The data of a block are mu and g. Forces that the law admits have g = 0; with mu = 0 it is a threshold g (Tresca), as in
-  an iteration in which the radius is that of the last one (freeze).
+  The data of a block are mu and g. Forces that the law admits have g = 0; with mu = 0 it is a threshold g (Tresca), as
+  in an iteration in which the radius is that of the last one (freeze).
 */
 #include <hycoconeimpl.h>
 #include <hycocoulomb.h>
 
-static PetscErrorCode Project(HycoCone cone, const PetscReal data[], const PetscReal y[], PetscReal z[])
+static PetscErrorCode CoulombProject(HycoCone cone, const PetscReal data[], const PetscReal y[], PetscReal z[])
 {
   PetscFunctionBegin;
   HycoCoulombProject(cone->size, data, y, z);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Derivative(HycoCone cone, const PetscReal data[], const PetscReal y[], PetscReal J[])
+static PetscErrorCode CoulombDerivative(HycoCone cone, const PetscReal data[], const PetscReal y[], PetscReal J[])
 {
   PetscFunctionBegin;
   HycoCoulombDerivative(cone->size, data, y, J);
@@ -24,7 +25,7 @@ static PetscErrorCode Derivative(HycoCone cone, const PetscReal data[], const Pe
 }
 
 /* mu = 0 and the threshold of the last forces (Tresca's law): with it P is the projection onto a fixed convex set. */
-static PetscErrorCode Freeze(HycoCone cone, const PetscReal data[], const PetscReal r[], PetscReal frozen[])
+static PetscErrorCode CoulombFreeze(HycoCone cone, const PetscReal data[], const PetscReal r[], PetscReal frozen[])
 {
   PetscFunctionBegin;
   (void)cone;
@@ -36,7 +37,7 @@ static PetscErrorCode Freeze(HycoCone cone, const PetscReal data[], const PetscR
 /* Not nonnegative even where the coefficient is 0: the tangential rows then have the one admissible force 0. */
 PetscErrorCode HycoConeCreate_Coulomb(HycoCone cone)
 {
-  const struct _HycoConeOps ops = {.project = Project, .derivative = Derivative, .freeze = Freeze};
+  const struct _HycoConeOps ops = {.project = CoulombProject, .derivative = CoulombDerivative, .freeze = CoulombFreeze};
 
   PetscFunctionBegin;
   PetscCall(HycoConeSetOps(cone, &ops, 2));

@@ -11,7 +11,7 @@ typedef struct {
 
 /* Computes w = q + M z for the contacts that are not active (all if M is not symmetric); returns the size relative
    to which its zeros are round-off. Of a symmetric M the fewer rows are read. */
-static PetscReal Slack(const Dense *d, const PetscBool active[])
+static PetscReal LCPSlack(const Dense *d, const PetscBool active[])
 {
   const PetscInt n = d->lcp->n;
   const PetscReal *M = d->lcp->M, *q = d->lcp->q;
@@ -40,10 +40,10 @@ static PetscReal Slack(const Dense *d, const PetscBool active[])
 }
 
 /* A dependent contact violates only if it does so by more than the tolerance of the dependence. */
-static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool violates[])
+static PetscErrorCode LCPViolations(void *ctx, const PetscBool active[], PetscBool violates[])
 {
   const Dense *d = (const Dense *)ctx;
-  const PetscReal size_w = Slack(d, active);
+  const PetscReal size_w = LCPSlack(d, active);
   PetscReal size_z = 0;
 
   PetscFunctionBegin;
@@ -83,7 +83,8 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
 }
 
 /* Dense primal-dual active set from `active`, which is also the result; z: n (with p pinned unknowns p + n). On one
-   process, or alike on every rank. Primal-dual active set (Hintermueller, Ito and Kunisch 2003): a Newton method whose iterates are sets, so that it ends with the exact solution or cycles. */
+   process, or alike on every rank. Primal-dual active set (Hintermueller, Ito and Kunisch 2003): a Newton method whose
+   iterates are sets, so that it ends with the exact solution or cycles. */
 PetscErrorCode HycoLCPActiveSet(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
                                 HycoLCPStatus *status)
 {
@@ -93,7 +94,7 @@ PetscErrorCode HycoLCPActiveSet(const HycoLCP *lcp, PetscBool active[], PetscRea
                      .max_its = lcp->max_its ? lcp->max_its : 50 + 4 * lcp->n,
                      .ctx = &d,
                      .solve = SolveOnSet,
-                     .violations = Violations,
+                     .violations = LCPViolations,
                      .monitor = lcp->monitor,
                      .monitor_ctx = lcp->monitor_ctx};
 

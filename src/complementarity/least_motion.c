@@ -1,7 +1,7 @@
 /*
   Bodies along whose motions no contact force acts, as where friction alone would hold them and its coefficient is 0: of
-  the solutions, which differ by these motions, the one in which the closed contacts slip least in the step, then the one
-  with the least motion, where no gap becomes negative.
+  the solutions, which differ by these motions, the one in which the closed contacts slip least in the step, then the
+  one with the least motion, where no gap becomes negative.
 */
 #include <hycoconeimpl.h>
 #include <hycolcp.h>
@@ -15,13 +15,13 @@
 #define TINY  1e-12 /* of the largest gap or slip: round-off */
 
 /* Coulomb's law: its first datum is the coefficient. */
-PetscBool HycoBlockRubs(const HycoBlocks *b, PetscInt k)
+PetscBool HycoBlockHasFriction(const HycoBlocks *b, PetscInt k)
 {
   return (PetscBool)(b->row[k + 1] - b->row[k] > 1 && b->data[b->at[k]] > 0);
 }
 
-/* The free motions (p x n by columns) of the rows of blocks with a force, on scaled motions: tangents hold where there is
-   friction; slips (or NULL): not where it slips. */
+/* The free motions (p x n by columns) of the rows of blocks with a force, on scaled motions: tangents hold where there
+   is friction; slips (or NULL): not where it slips. */
 static PetscErrorCode FreeMotions(const HycoBlocks *b, PetscInt p, const PetscReal A[], const PetscReal scale[],
                                   const PetscBool closed[], const PetscBool slips[], PetscInt *n, PetscReal N[])
 {
@@ -34,7 +34,7 @@ static PetscErrorCode FreeMotions(const HycoBlocks *b, PetscInt p, const PetscRe
   PetscCall(PetscCalloc3(p * p, &gram, p, &value, 8 * p, &work));
   for (PetscInt k = 0; k < b->n; k++) {
     for (PetscInt j = b->row[k]; j < b->row[k + 1] && closed[k]; j++) {
-      if (j > b->row[k] && (!HycoBlockRubs(b, k) || (slips && slips[k]))) continue;
+      if (j > b->row[k] && (!HycoBlockHasFriction(b, k) || (slips && slips[k]))) continue;
       for (PetscInt i = 0; i < p * p; i++)
         gram[i] += A[j * p + i / p] * A[j * p + i % p] / (scale[i / p] * scale[i % p]);
     }
@@ -90,7 +90,8 @@ static PetscErrorCode LeastSlip(PetscInt n, PetscReal H[], const PetscReal g[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Changes c as little as possible such that the gaps of open contacts stay; *exists: as is always so but for round-off. */
+/* Changes c as little as possible such that the gaps of open contacts stay; *exists: as is always so but for
+   round-off. */
 static PetscErrorCode KeepGaps(const HycoBlocks *b, PetscInt p, PetscInt n, const PetscReal A[], const PetscReal w[],
                                const PetscBool closed[], const PetscReal N[], const PetscReal E[], PetscReal c[],
                                PetscBool *exists)
@@ -129,10 +130,10 @@ static void ScaleMotions(const HycoBlocks *b, PetscInt p, const PetscReal A[], P
   for (PetscInt i = 0; i < p; i++) scale[i] = scale[i] > 0 ? PetscSqrtReal(scale[i]) : 1;
 }
 
-/* Of the free motions the one along the friction f (p) of the contacts that slip, in the metric of all rows: whatever the
-   basis of the motions is, the same. */
-static PetscErrorCode AlongFriction(const HycoBlocks *b, PetscInt p, const PetscReal A[], const PetscReal f[],
-                                    PetscInt n, const PetscReal N[], PetscReal first[])
+/* Of the free motions the one along the friction f (p) of the contacts that slip, in the metric of all rows: whatever
+   the basis of the motions is, the same. */
+static PetscErrorCode FrictionSensitivity(const HycoBlocks *b, PetscInt p, const PetscReal A[], const PetscReal f[],
+                                          PetscInt n, const PetscReal N[], PetscReal first[])
 {
   const PetscBLASInt size = (PetscBLASInt)n, one = 1;
   PetscBLASInt info, *pivot;
@@ -157,8 +158,8 @@ static PetscErrorCode AlongFriction(const HycoBlocks *b, PetscInt p, const Petsc
 }
 
 /* Slipping contacts hold no motion along their surface. */
-PetscErrorCode HycoBlocksLoose(const HycoBlocks *b, PetscInt p, const PetscReal A[], const PetscReal r[], PetscInt *n,
-                               PetscReal first[])
+PetscErrorCode HycoBlocksFreeMotions(const HycoBlocks *b, PetscInt p, const PetscReal A[], const PetscReal r[],
+                                     PetscInt *n, PetscReal first[])
 {
   PetscReal *scale, *N, *f, most = 0;
   PetscBool *closed, *slips;
@@ -173,22 +174,23 @@ PetscErrorCode HycoBlocksLoose(const HycoBlocks *b, PetscInt p, const PetscReal 
 
     for (PetscInt j = b->row[k] + 1; j < b->row[k + 1]; j++) shear += r[j] * r[j];
     closed[k] = (PetscBool)(most > 0 && force > HOLDS * most);
-    slips[k] = (PetscBool)(HycoBlockRubs(b, k) && PetscSqrtReal(shear) >= (1 - EDGE) * b->data[b->at[k]] * force);
+    slips[k] =
+        (PetscBool)(HycoBlockHasFriction(b, k) && PetscSqrtReal(shear) >= (1 - EDGE) * b->data[b->at[k]] * force);
     for (PetscInt j = b->row[k] + 1; j < b->row[k + 1] && slips[k]; j++) {
       for (PetscInt i = 0; i < p; i++) f[i] += A[j * p + i] * r[j];
     }
   }
   *n = 0;
   if (most > 0) PetscCall(FreeMotions(b, p, A, scale, closed, slips, n, N));
-  if (*n) PetscCall(AlongFriction(b, p, A, f, *n, N, first));
+  if (*n) PetscCall(FrictionSensitivity(b, p, A, f, *n, N, first));
   PetscCall(PetscFree5(scale, N, f, closed, slips));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* A: p x rows by columns; w changes by -A^T x. */
-PetscErrorCode HycoBlocksStay(const HycoBlocks *b, PetscInt p, const PetscReal A[], const PetscReal w[],
-                              const PetscReal r[], const PetscReal move[], PetscReal x[], PetscInt *n,
-                              PetscReal first[])
+PetscErrorCode HycoBlocksLeastSlip(const HycoBlocks *b, PetscInt p, const PetscReal A[], const PetscReal w[],
+                                   const PetscReal r[], const PetscReal move[], PetscReal x[], PetscInt *n,
+                                   PetscReal first[])
 {
   PetscReal *scale, *N, *H, *g, *a, *c, *E, most = 0;
   PetscBool *closed, exists;

@@ -27,7 +27,7 @@ typedef struct {
 } Dictionary;
 
 /* Entry i of the covering vector, in [1, 2): fractional parts of multiples of the golden ratio, plus 1. */
-static PetscReal Cover(PetscInt i)
+static PetscReal LemkeCover(PetscInt i)
 {
   const PetscReal x = 0.6180339887498949 * (PetscReal)(i + 1);
 
@@ -48,7 +48,7 @@ static PetscErrorCode DictionaryCreate(PetscInt n, const PetscReal M[], const Pe
   for (size_t k = 0; k < (size_t)n * (size_t)n; k++) d->T[k] = M[k] / size_M;
   for (PetscInt i = 0; i < n; i++) {
     /* The covering vector: slightly different entries break ties of the first pivots. */
-    d->T[(size_t)n * (size_t)n + (size_t)i] = Cover(i);
+    d->T[(size_t)n * (size_t)n + (size_t)i] = LemkeCover(i);
     d->value[i] = q[i] / size_q;
     d->basic[i] = d->where[i] = i;
     d->nonbasic[i] = n + i;
@@ -60,7 +60,7 @@ static PetscErrorCode DictionaryCreate(PetscInt n, const PetscReal M[], const Pe
 }
 
 /* Entry (i, j) of the current dictionary, with the collected pivots. */
-static PetscReal Entry(const Dictionary *d, PetscInt i, PetscInt j)
+static PetscReal LemkeEntry(const Dictionary *d, PetscInt i, PetscInt j)
 {
   const size_t n = (size_t)d->n;
   PetscReal sum = d->T[(size_t)j * n + (size_t)i];
@@ -71,7 +71,7 @@ static PetscReal Entry(const Dictionary *d, PetscInt i, PetscInt j)
 }
 
 /* Numbers of rows and columns of T, and of collected pivots. */
-static PetscErrorCode Sizes(const Dictionary *d, PetscBLASInt *n, PetscBLASInt *cols, PetscBLASInt *waiting)
+static PetscErrorCode LemkeSizes(const Dictionary *d, PetscBLASInt *n, PetscBLASInt *cols, PetscBLASInt *waiting)
 {
   PetscFunctionBegin;
   PetscCall(PetscBLASIntCast(d->n, n));
@@ -87,7 +87,7 @@ static PetscErrorCode FetchColumn(Dictionary *d, PetscInt j)
   const PetscReal plus = 1, minus = -1;
 
   PetscFunctionBegin;
-  PetscCall(Sizes(d, &n, &cols, &k));
+  PetscCall(LemkeSizes(d, &n, &cols, &k));
   PetscCall(PetscArraycpy(d->column, d->T + (size_t)j * (size_t)n, n));
   if (k) BLASgemv_("N", &n, &k, &minus, d->U, &n, d->V + j, &cols, &plus, d->column, &one);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -100,20 +100,20 @@ static PetscErrorCode FetchRow(Dictionary *d, PetscInt i)
   const PetscReal plus = 1, minus = -1;
 
   PetscFunctionBegin;
-  PetscCall(Sizes(d, &n, &cols, &k));
+  PetscCall(LemkeSizes(d, &n, &cols, &k));
   for (PetscInt j = 0; j < cols; j++) d->row[j] = d->T[(size_t)j * (size_t)n + (size_t)i];
   if (k) BLASgemv_("N", &cols, &k, &minus, d->V, &cols, d->U + i, &n, &plus, d->row, &one);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* One product for up to 48 pivots, at the speed of matrix multiplication. */
-static PetscErrorCode Apply(Dictionary *d)
+static PetscErrorCode LemkeApply(Dictionary *d)
 {
   PetscBLASInt n, cols, k;
   const PetscReal plus = 1, minus = -1;
 
   PetscFunctionBegin;
-  PetscCall(Sizes(d, &n, &cols, &k));
+  PetscCall(LemkeSizes(d, &n, &cols, &k));
   if (k) BLASgemm_("N", "T", &n, &cols, &k, &minus, d->U, &n, d->V, &cols, &plus, d->T, &n);
   d->waiting = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -121,7 +121,7 @@ static PetscErrorCode Apply(Dictionary *d)
 
 /* The variable of column c becomes basic in row r; d->column has T[:,c]. Stores row and column; the pivot is
    collected. */
-static PetscErrorCode Pivot(Dictionary *d, PetscInt r, PetscInt c)
+static PetscErrorCode LemkePivot(Dictionary *d, PetscInt r, PetscInt c)
 {
   const PetscInt n = d->n, enters = d->nonbasic[c], leaves = d->basic[r];
   const PetscReal p = d->column[r], step = -d->value[r] / p;
@@ -142,7 +142,7 @@ static PetscErrorCode Pivot(Dictionary *d, PetscInt r, PetscInt c)
   d->row[c] = 0;
   PetscCall(PetscArraycpy(d->U + (size_t)d->waiting * (size_t)n, d->column, n));
   for (PetscInt j = 0; j <= n; j++) d->V[(size_t)d->waiting * (size_t)(n + 1) + (size_t)j] = d->row[j] / p;
-  if (++d->waiting == CHUNK) PetscCall(Apply(d));
+  if (++d->waiting == CHUNK) PetscCall(LemkeApply(d));
   d->basic[r] = enters;
   d->where[enters] = r;
   d->nonbasic[c] = leaves;
@@ -166,7 +166,7 @@ static PetscInt BreakTie(const Dictionary *d, PetscInt n_tied)
     for (PetscInt pass = 0; pass < 2; pass++) {
       for (PetscInt t = 0; t < n_tied; t++) {
         const PetscInt i = tied[t];
-        const PetscReal inverse = d->where[w] < 0 ? -Entry(d, i, -1 - d->where[w]) : d->where[w] == i;
+        const PetscReal inverse = d->where[w] < 0 ? -LemkeEntry(d, i, -1 - d->where[w]) : d->where[w] == i;
         const PetscReal x = -inverse / d->column[i];
 
         if (pass == 0) least = PetscMin(least, x);
@@ -179,7 +179,7 @@ static PetscInt BreakTie(const Dictionary *d, PetscInt n_tied)
 }
 
 /* The row that leaves when the variable of d->column increases: the first whose value becomes 0; -1: none. */
-static PetscInt Leaving(Dictionary *d)
+static PetscInt LemkeLeaving(Dictionary *d)
 {
   PetscReal size = 0, largest = 0, step = PETSC_MAX_REAL;
   PetscInt n_tied = 0;
@@ -200,7 +200,7 @@ static PetscInt Leaving(Dictionary *d)
 
 /* All pivots, from the first, in row `row`, to the end. Complementary pivoting (Lemke 1965): exactly one of each pair
    w_i, z_i is basic until the artificial variable leaves. */
-static PetscErrorCode Run(Dictionary *d, PetscInt row, PetscInt max_its, PetscInt *its, HycoLCPStatus *status)
+static PetscErrorCode LemkeRun(Dictionary *d, PetscInt row, PetscInt max_its, PetscInt *its, HycoLCPStatus *status)
 {
   const PetscInt n = d->n;
   PetscInt col = n;
@@ -211,7 +211,7 @@ static PetscErrorCode Run(Dictionary *d, PetscInt row, PetscInt max_its, PetscIn
   for (; *its < max_its; (*its)++) {
     const PetscInt left = d->basic[row];
 
-    PetscCall(Pivot(d, row, col));
+    PetscCall(LemkePivot(d, row, col));
     if (left == 2 * n) {
       *status = HYCO_LCP_SOLVED;
       break;
@@ -219,7 +219,7 @@ static PetscErrorCode Run(Dictionary *d, PetscInt row, PetscInt max_its, PetscIn
     /* w_i left: z_i enters; z_i left: w_i enters. */
     col = -1 - d->where[left < n ? left + n : left - n]; /* the complement of the variable that left enters */
     PetscCall(FetchColumn(d, col));
-    row = Leaving(d);
+    row = LemkeLeaving(d);
     if (row < 0) {
       *status = HYCO_LCP_RAY;
       break;
@@ -230,7 +230,7 @@ static PetscErrorCode Run(Dictionary *d, PetscInt row, PetscInt max_its, PetscIn
 
 /* Largest violation of w >= 0 relative to q, and of z >= 0 relative to z. A basis from many pivots may have lost
    digits; the comparison is with the original M and q. */
-static PetscReal Violation(PetscInt n, const PetscReal M[], const PetscReal q[], const PetscReal z[])
+static PetscReal LemkeViolation(PetscInt n, const PetscReal M[], const PetscReal q[], const PetscReal z[])
 {
   PetscReal worst = 0, size_q = 0, size_z = 0, least_z = 0;
 
@@ -251,8 +251,8 @@ static PetscReal Violation(PetscInt n, const PetscReal M[], const PetscReal q[],
 
 /* z of the last basis: from the pivots or solved anew, whichever has the smaller violation. Solving anew on the support
    removes the round-off of all pivots. */
-static PetscErrorCode Unpack(const Dictionary *d, const PetscReal M[], const PetscReal q[], PetscReal scale,
-                             PetscReal z[])
+static PetscErrorCode LemkeUnpack(const Dictionary *d, const PetscReal M[], const PetscReal q[], PetscReal scale,
+                                  PetscReal z[])
 {
   PetscInt *a, k = 0;
   PetscReal *fresh;
@@ -268,7 +268,7 @@ static PetscErrorCode Unpack(const Dictionary *d, const PetscReal M[], const Pet
     if (z[i] > 0) a[k++] = i;
   }
   PetscCall(HycoLCPSolveOnSet(d->n, M, q, PETSC_FALSE, NULL, &k, a, fresh, &singular));
-  if (!singular && Violation(d->n, M, q, fresh) < Violation(d->n, M, q, z)) {
+  if (!singular && LemkeViolation(d->n, M, q, fresh) < LemkeViolation(d->n, M, q, z)) {
     for (PetscInt i = 0; i < d->n; i++) z[i] = PetscMax(fresh[i], 0);
   }
   PetscCall(PetscFree2(a, fresh));
@@ -292,15 +292,15 @@ PetscErrorCode HycoLCPLemke(PetscInt n, const PetscReal M[], const PetscReal q[]
     size_M = PetscMax(size_M, PetscAbsReal(M[(size_t)i * (size_t)n + (size_t)i]));
     size_q = PetscMax(size_q, PetscAbsReal(q[i]));
     /* z0 enters with the value at which all of q + Cover z0 are >= 0; the row that then is 0 leaves. */
-    if (q[i] < 0 && (row < 0 || q[i] / Cover(i) <= q[row] / Cover(row)))
+    if (q[i] < 0 && (row < 0 || q[i] / LemkeCover(i) <= q[row] / LemkeCover(row)))
       row = i; /* the last of equal ones: lexicographic rule */
   }
   /* q >= 0: z = 0 is the solution. */
   if (row < 0) PetscFunctionReturn(PETSC_SUCCESS);
   if (size_M == 0) size_M = 1;
   PetscCall(DictionaryCreate(n, M, q, size_M, size_q, &d));
-  PetscCall(Run(&d, row, max_its, its, status));
-  if (*status == HYCO_LCP_SOLVED) PetscCall(Unpack(&d, M, q, size_q / size_M, z));
+  PetscCall(LemkeRun(&d, row, max_its, its, status));
+  if (*status == HYCO_LCP_SOLVED) PetscCall(LemkeUnpack(&d, M, q, size_q / size_M, z));
   /* Also of one whose run ended early: no state is left outside it. */
   PetscCall(PetscFree3(d.T, d.U, d.V));
   PetscCall(PetscFree3(d.value, d.column, d.row));

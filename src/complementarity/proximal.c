@@ -25,15 +25,15 @@ typedef struct {
 } Proximal;
 
 /* Column j of (A; S). */
-static const PetscReal *Column(const Proximal *h, PetscInt j)
+static const PetscReal *ProximalColumn(const Proximal *h, PetscInt j)
 {
   return h->lcp->M + (size_t)(h->p + j) * (size_t)(h->p + h->m);
 }
 
 /* A^T v */
-static PetscReal Closing(const Proximal *h, PetscInt j, const PetscReal v[])
+static PetscReal ProximalClosingOf(const Proximal *h, PetscInt j, const PetscReal v[])
 {
-  const PetscReal *A = Column(h, j);
+  const PetscReal *A = ProximalColumn(h, j);
   PetscReal sum = 0;
 
   for (PetscInt i = 0; i < h->p; i++) sum += A[i] * v[i];
@@ -48,7 +48,7 @@ static void SetSprings(Proximal *h)
 
   for (PetscInt i = 0; i < h->p; i++) {
     for (PetscInt j = 0; j < h->m; j++) {
-      const PetscReal *A = Column(h, j), *S = A + h->p;
+      const PetscReal *A = ProximalColumn(h, j), *S = A + h->p;
 
       /* 1 / S_jj is the stiffness of contact j, A_ij its arm on unknown i. */
       if (S[j] > 0) h->kappa[i] = PetscMax(h->kappa[i], SOFT * A[i] * A[i] / S[j]);
@@ -74,7 +74,7 @@ static PetscErrorCode AddSprings(Proximal *h)
   PetscCall(PetscBLASIntCast(h->p, &rows));
   PetscCall(PetscBLASIntCast(h->m, &cols));
   for (size_t j = 0; j < m; j++) {
-    const PetscReal *column = Column(h, (PetscInt)j);
+    const PetscReal *column = ProximalColumn(h, (PetscInt)j);
 
     /* Rows of the pinned unknowns over the square root of their spring. */
     for (size_t i = 0; i < p; i++) A[j * p + i] = column[i] / PetscSqrtReal(h->kappa[i]);
@@ -87,11 +87,11 @@ static PetscErrorCode AddSprings(Proximal *h)
 
 /* r and x for the forces L; NULL: for none. r: what is left of the load on the unknowns; x moves by it against the
    springs. */
-static void Place(Proximal *h, const PetscReal L[])
+static void ProximalPosition(Proximal *h, const PetscReal L[])
 {
   for (PetscInt i = 0; i < h->p; i++) h->r[i] = -h->lcp->q[i];
   for (PetscInt j = 0; L && j < h->m; j++) {
-    const PetscReal *A = Column(h, j);
+    const PetscReal *A = ProximalColumn(h, j);
 
     for (PetscInt i = 0; i < h->p && L[j] != 0; i++) h->r[i] -= A[i] * L[j];
   }
@@ -111,9 +111,9 @@ static PetscErrorCode SolveForces(Proximal *h, PetscBool active[], PetscReal L[]
   PetscInt more;
 
   PetscFunctionBegin;
-  Place(h, NULL);
+  ProximalPosition(h, NULL);
   for (PetscInt j = 0; j < h->m; j++) {
-    h->gap[j] = h->lcp->q[h->p + j] - Closing(h, j, h->x);
+    h->gap[j] = h->lcp->q[h->p + j] - ProximalClosingOf(h, j, h->x);
     if (h->S[(size_t)j * (size_t)h->m + (size_t)j] == 0) h->gap[j] = 0; /* a contact without a row */
   }
   PetscCall(HycoLCPActiveSet(&held, active, L, &more, status));
@@ -127,13 +127,13 @@ static PetscErrorCode SolveForces(Proximal *h, PetscBool active[], PetscReal L[]
     L[j] = PetscMax(L[j], 0);
     active[j] = (PetscBool)(L[j] > 0);
   }
-  Place(h, L);
+  ProximalPosition(h, L);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Whether the springs carry nothing but round-off. Relative to each unknown's own forces, but not to less than 1e-3
    of the largest. */
-static PetscBool Balanced(const Proximal *h, const PetscReal L[])
+static PetscBool ProximalBalanced(const Proximal *h, const PetscReal L[])
 {
   PetscReal most = 0;
   PetscBool all = PETSC_TRUE;
@@ -143,7 +143,7 @@ static PetscBool Balanced(const Proximal *h, const PetscReal L[])
     for (PetscInt i = 0; i < h->p; i++) {
       PetscReal size = PetscAbsReal(h->lcp->q[i]);
 
-      for (PetscInt j = 0; j < h->m; j++) size += PetscAbsReal(Column(h, j)[i]) * L[j];
+      for (PetscInt j = 0; j < h->m; j++) size += PetscAbsReal(ProximalColumn(h, j)[i]) * L[j];
       if (pass) all = (PetscBool)(all && PetscAbsReal(h->r[i]) <= BALANCED * PetscMax(size, 1e-3 * most));
       most = PetscMax(most, size);
     }
@@ -153,7 +153,7 @@ static PetscBool Balanced(const Proximal *h, const PetscReal L[])
 
 /* Whether the step r / kappa is a motion that closes no contact and on which the load has work. If not, *far: how many
    such steps the bodies may move until an open contact closes; 0 if the step closes a contact further. */
-static PetscBool Escapes(Proximal *h, const PetscReal L[], PetscReal *far)
+static PetscBool ProximalIsFreeMotion(Proximal *h, const PetscReal L[], PetscReal *far)
 {
   PetscReal size = 0, work = 0;
   PetscBool none = PETSC_TRUE;
@@ -166,12 +166,12 @@ static PetscBool Escapes(Proximal *h, const PetscReal L[], PetscReal *far)
   for (PetscInt j = 0; j < h->m; j++) {
     PetscReal sum = 0;
 
-    for (PetscInt i = 0; i < h->p; i++) sum += PetscAbsReal(Column(h, j)[i] * h->step[i]);
+    for (PetscInt i = 0; i < h->p; i++) sum += PetscAbsReal(ProximalColumn(h, j)[i] * h->step[i]);
     size = PetscMax(size, sum);
   }
   for (PetscInt j = 0; j < h->m; j++) {
-    const PetscReal closing = Closing(h, j, h->step), *S = Column(h, j) + h->p;
-    PetscReal w = h->lcp->q[h->p + j] - Closing(h, j, h->x);
+    const PetscReal closing = ProximalClosingOf(h, j, h->step), *S = ProximalColumn(h, j) + h->p;
+    PetscReal w = h->lcp->q[h->p + j] - ProximalClosingOf(h, j, h->x);
 
     if (closing <= TANGENT * size) continue;
     none = PETSC_FALSE;
@@ -184,7 +184,8 @@ static PetscBool Escapes(Proximal *h, const PetscReal L[], PetscReal *far)
 }
 
 /* far: a long way without contact is covered at once, instead of by many small steps. */
-static PetscErrorCode Iterate(Proximal *h, PetscBool active[], PetscReal L[], PetscInt *its, HycoLCPStatus *status)
+static PetscErrorCode ProximalIterate(Proximal *h, PetscBool active[], PetscReal L[], PetscInt *its,
+                                      HycoLCPStatus *status)
 {
   PetscReal far;
 
@@ -193,9 +194,9 @@ static PetscErrorCode Iterate(Proximal *h, PetscBool active[], PetscReal L[], Pe
   PetscCall(AddSprings(h));
   for (PetscInt k = 0; k < MOST_ITS; k++) {
     PetscCall(SolveForces(h, active, L, its, status));
-    if (*status != HYCO_LCP_SOLVED || Balanced(h, L)) PetscFunctionReturn(PETSC_SUCCESS);
+    if (*status != HYCO_LCP_SOLVED || ProximalBalanced(h, L)) PetscFunctionReturn(PETSC_SUCCESS);
     /* LIMIT stands until a further step balances the forces; it is what the caller sees after MOST_ITS. */
-    *status = Escapes(h, L, &far) ? HYCO_LCP_RAY : HYCO_LCP_LIMIT;
+    *status = ProximalIsFreeMotion(h, L, &far) ? HYCO_LCP_RAY : HYCO_LCP_LIMIT;
     if (*status == HYCO_LCP_RAY) PetscFunctionReturn(PETSC_SUCCESS);
     for (PetscInt i = 0; i < h->p; i++) h->centre[i] = h->x[i] + far * h->step[i];
   }
@@ -213,7 +214,7 @@ PetscErrorCode HycoLCPProximal(const HycoLCP *lcp, PetscBool active[], PetscReal
   PetscFunctionBegin;
   PetscCall(PetscMalloc2((size_t)m * (size_t)m, &h.S, m, &h.gap));
   PetscCall(PetscCalloc5(p, &h.kappa, p, &h.centre, p, &h.x, p, &h.r, p, &h.step));
-  PetscCall(Iterate(&h, active, z + p, its, status));
+  PetscCall(ProximalIterate(&h, active, z + p, its, status));
   /* The pinned unknowns of the last centre; forces are in place. */
   PetscCall(PetscArraycpy(z, h.x, p));
   PetscCall(PetscFree2(h.S, h.gap));

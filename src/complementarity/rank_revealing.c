@@ -30,8 +30,8 @@ static void CopyScaled(PetscInt n, const PetscReal M[], PetscInt k, const PetscI
 
 /* Factors A (k x k, overwritten) and solves in place; *regular: no pivot below `tol` of the largest, and a finite
    solution. Cholesky if symmetric, else LU with partial pivoting. */
-static PetscErrorCode Solve(PetscInt k, PetscReal A[], PetscBool symmetric, PetscReal tol, PetscReal x[],
-                            PetscBool *regular)
+static PetscErrorCode RankRevealingSolve(PetscInt k, PetscReal A[], PetscBool symmetric, PetscReal tol, PetscReal x[],
+                                         PetscBool *regular)
 {
   PetscBLASInt n, one = 1, info = 0, *ipiv;
   PetscReal least = PETSC_MAX_REAL, most = 0;
@@ -78,7 +78,7 @@ static PetscInt NextPivot(PetscInt k, const PetscReal A[], const PetscReal gap[]
 
 /* Diagonal pivoting of A (k x k, overwritten): kept[i] marks a largest set on which A is regular. The Schur
    complement is updated for all columns: O(k^2) for each pivot. */
-static PetscErrorCode Reveal(PetscInt k, PetscReal A[], const PetscReal gap[], PetscBool kept[])
+static PetscErrorCode RankRevealingPivot(PetscInt k, PetscReal A[], const PetscReal gap[], PetscBool kept[])
 {
   PetscReal *row;
 
@@ -120,7 +120,7 @@ PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank)
   }
   /* All gaps 0 from here: the order of pivots follows from the diagonal alone. */
   PetscCall(PetscArrayzero(d, k));
-  PetscCall(Reveal(k, A, d, kept));
+  PetscCall(RankRevealingPivot(k, A, d, kept));
   for (PetscInt j = 0; j < k; j++) *rank += kept[j];
   PetscCall(PetscFree2(d, kept));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -137,7 +137,7 @@ static PetscErrorCode TrySet(PetscInt n, const PetscReal M[], const PetscReal q[
   CopyScaled(n, M, k, a, A, d);
   /* The scaled problem: D M D (D^-1 z) = -D q. */
   for (PetscInt j = 0; j < k; j++) x[j] = -q[a[j]] * d[j];
-  PetscCall(Solve(k, A, symmetric, tol, x, regular));
+  PetscCall(RankRevealingSolve(k, A, symmetric, tol, x, regular));
   for (PetscInt j = 0; *regular && j < k; j++) z[a[j]] = x[j] * d[j];
   PetscCall(PetscFree2(x, d));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -166,7 +166,7 @@ PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscRea
     /* The gaps in the scale of the matrix; equal pivots with different gaps are repeated contacts, of which the
        smallest gap binds. */
     for (PetscInt j = 0; j < *k; j++) d[j] *= q[a[j]];
-    PetscCall(Reveal(*k, A, d, kept));
+    PetscCall(RankRevealingPivot(*k, A, d, kept));
     for (PetscInt j = 0; j < *k; j++) {
       if (kept[j]) a[n_kept++] = a[j];
     }

@@ -6,10 +6,10 @@
 
   by the active set method. It starts with every contact closed, so that contact prevents rigid motions if it can, and
   opens those under tension. Where a set does not determine L and x_p (contacts that repeat others, motions that no
-  closed contact prevents), or no set is reached, the proximal point method continues (proximal.c). Its springs carry the
-  round-off of the gaps, which is more than a load that is tiny beside loads that balance themselves: then the primal
-  active set method of quadratic programming (J. Nocedal, S. J. Wright, Numerical Optimization (2006), algorithm 16.3)
-  for min L.S L / 2 + g.L, A L = f', L >= 0, from the forces of a few contacts that balance the load.
+  closed contact prevents), or no set is reached, the proximal point method continues (proximal.c). Its springs carry
+  the round-off of the gaps, which is more than a load that is tiny beside loads that balance themselves: then the
+  primal active set method of quadratic programming (J. Nocedal, S. J. Wright, Numerical Optimization (2006), algorithm
+  16.3) for min L.S L / 2 + g.L, A L = f', L >= 0, from the forces of a few contacts that balance the load.
 */
 #include <hycoalgorithms.h>
 #include <hycolcp.h>
@@ -106,8 +106,8 @@ static PetscErrorCode SolveByCholesky(Floating *h, PetscBool *solved)
         for (PetscInt k = 0; k < n; k++) H[j * p + i] += Y[i * n + k] * Y[j * n + k];
       }
     }
-    /* Where no closed contact meets a motion, only round-off of K' is left of its entry, and the loads' motion is without
-       bounds. */
+    /* Where no closed contact meets a motion, only round-off of K' is left of its entry, and the loads' motion is
+       without bounds. */
     for (PetscInt i = 0; i < p; i++) *solved = (PetscBool)(*solved && H[i * (p + 1)] * h->flexibility > HYCO_DEPENDENT);
     if (*solved) PetscCall(HycoCholesky("L", p, H, NULL, solved));
   }
@@ -149,7 +149,7 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
 }
 
 /* Computes w; returns the size relative to which its zeros are round-off. */
-static PetscReal Slack(const Floating *h)
+static PetscReal SemidefiniteSlack(const Floating *h)
 {
   PetscReal size = 0;
 
@@ -168,10 +168,10 @@ static PetscReal Slack(const Floating *h)
 }
 
 /* Forces and slacks below 1e-12 of the largest are round-off. Idle contacts violate nothing. */
-static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool violates[])
+static PetscErrorCode SemidefiniteViolations(void *ctx, const PetscBool active[], PetscBool violates[])
 {
   const Floating *h = (const Floating *)ctx;
-  const PetscReal size_w = Slack(h);
+  const PetscReal size_w = SemidefiniteSlack(h);
   PetscReal size_z = 0;
 
   PetscFunctionBegin;
@@ -183,7 +183,7 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
 }
 
 /* r = q + M z, for all unknowns. */
-static void Residual(const Floating *h, const PetscReal z[], PetscReal r[])
+static void SemidefiniteResidual(const Floating *h, const PetscReal z[], PetscReal r[])
 {
   for (PetscInt i = 0; i < h->n; i++) r[i] = h->q[i];
   for (PetscInt j = 0; j < h->n; j++) {
@@ -193,8 +193,8 @@ static void Residual(const Floating *h, const PetscReal z[], PetscReal r[])
   }
 }
 
-/* d: the change of z that closes the contacts of the set and balances the load, from r = q + M z. Its round-off is that of
-   r, not of the gaps without forces, which loads that balance themselves may make large. */
+/* d: the change of z that closes the contacts of the set and balances the load, from r = q + M z. Its round-off is that
+   of r, not of the gaps without forces, which loads that balance themselves may make large. */
 static PetscErrorCode SolveChange(Floating *h, const PetscReal r[], PetscBool active[], PetscReal d[],
                                   PetscBool *singular)
 {
@@ -212,9 +212,9 @@ static PetscErrorCode SolveChange(Floating *h, const PetscReal r[], PetscBool ac
 #define FEW   200   /* closed contacts: with more, the primal method, which changes one at a time, takes too long */
 #define RESTS 1e-9  /* share of the load that no forces balance */
 
-/* The part of column j of A that is independent of `rank` orthonormal Q, as a share of its squared length; it is appended
-   to Q if `append`. */
-static PetscReal Part(const Floating *h, PetscInt j, PetscInt rank, PetscReal Q[], PetscBool append)
+/* The part of column j of A that is independent of `rank` orthonormal Q, as a share of its squared length; it is
+   appended to Q if `append`. */
+static PetscReal SemidefinitePart(const Floating *h, PetscInt j, PetscInt rank, PetscReal Q[], PetscBool append)
 {
   const PetscReal *A = h->M + (size_t)(h->p + j) * (size_t)h->n;
   PetscReal *rest = Q + rank * h->p, before = 0, after = 0;
@@ -237,7 +237,7 @@ static PetscReal Part(const Floating *h, PetscInt j, PetscInt rank, PetscReal Q[
 
 /* Closes contacts beside those of the set until these meet all motions that any contact meets, always the one that adds
    most. */
-static PetscErrorCode Span(const Floating *h, PetscBool active[])
+static PetscErrorCode SemidefiniteSpan(const Floating *h, PetscBool active[])
 {
   PetscReal *Q;
   PetscInt rank = 0, best = 0;
@@ -245,28 +245,28 @@ static PetscErrorCode Span(const Floating *h, PetscBool active[])
   PetscFunctionBegin;
   PetscCall(PetscMalloc1((h->p + 1) * h->p, &Q));
   for (PetscInt j = 0; j < h->m && rank < h->p; j++) {
-    if (active[j]) Part(h, j, rank++, Q, PETSC_TRUE);
+    if (active[j]) SemidefinitePart(h, j, rank++, Q, PETSC_TRUE);
   }
   while (rank < h->p && best >= 0) {
     PetscReal most = SPANS;
 
     best = -1;
     for (PetscInt j = 0; j < h->m; j++) {
-      const PetscReal part = active[j] || h->idle[j] ? 0 : Part(h, j, rank, Q, PETSC_FALSE);
+      const PetscReal part = active[j] || h->idle[j] ? 0 : SemidefinitePart(h, j, rank, Q, PETSC_FALSE);
 
       if (part > most) best = j;
       most = PetscMax(most, part);
     }
     if (best < 0) break;
     active[best] = PETSC_TRUE;
-    Part(h, best, rank++, Q, PETSC_TRUE);
+    SemidefinitePart(h, best, rank++, Q, PETSC_TRUE);
   }
   PetscCall(PetscFree(Q));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Forces L >= 0 of a few contacts that balance the load, and z = (0, L). */
-static PetscErrorCode Begin(Floating *h, PetscBool active[], PetscReal z[], PetscBool *exists)
+static PetscErrorCode SemidefiniteBegin(Floating *h, PetscBool active[], PetscReal z[], PetscBool *exists)
 {
   PetscReal *A, *f, size = 0, rest;
 
@@ -283,12 +283,12 @@ static PetscErrorCode Begin(Floating *h, PetscBool active[], PetscReal z[], Pets
   *exists = (PetscBool)(rest <= RESTS * PetscSqrtReal(size));
   for (PetscInt j = 0; j < h->m; j++) active[j] = (PetscBool)(z[h->p + j] > 0);
   PetscCall(PetscFree2(A, f));
-  if (*exists) PetscCall(Span(h, active));
+  if (*exists) PetscCall(SemidefiniteSpan(h, active));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Whether the columns of the set span less without contact j: then equilibrium alone determines its force. */
-static PetscErrorCode Needed(const Floating *h, const PetscBool active[], PetscInt j, PetscBool *needed)
+static PetscErrorCode SemidefiniteNeeded(const Floating *h, const PetscBool active[], PetscInt j, PetscBool *needed)
 {
   PetscReal *Q;
   PetscInt rank = 0;
@@ -296,16 +296,17 @@ static PetscErrorCode Needed(const Floating *h, const PetscBool active[], PetscI
   PetscFunctionBegin;
   PetscCall(PetscMalloc1((h->p + 1) * h->p, &Q));
   for (PetscInt i = 0; i < h->m && rank < h->p; i++) {
-    if (active[i] && i != j && Part(h, i, rank, Q, PETSC_TRUE) > SPANS) rank++;
+    if (active[i] && i != j && SemidefinitePart(h, i, rank, Q, PETSC_TRUE) > SPANS) rank++;
   }
-  *needed = (PetscBool)(rank < h->p && Part(h, j, rank, Q, PETSC_FALSE) > SPANS);
+  *needed = (PetscBool)(rank < h->p && SemidefinitePart(h, j, rank, Q, PETSC_FALSE) > SPANS);
   PetscCall(PetscFree(Q));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* z += d as far as no force becomes negative; *whole: all of it. Else the contact whose force becomes 0 leaves the set. The
-   change of a force that equilibrium determines is round-off. */
-static PetscErrorCode Advance(const Floating *h, PetscReal d[], PetscBool active[], PetscReal z[], PetscBool *whole)
+/* z += d as far as no force becomes negative; *whole: all of it. Else the contact whose force becomes 0 leaves the set.
+   The change of a force that equilibrium determines is round-off. */
+static PetscErrorCode SemidefiniteAdvance(const Floating *h, PetscReal d[], PetscBool active[], PetscReal z[],
+                                          PetscBool *whole)
 {
   PetscBool needed = PETSC_TRUE;
   PetscReal step = 1;
@@ -321,7 +322,7 @@ static PetscErrorCode Advance(const Floating *h, PetscReal d[], PetscBool active
       last = j;
     }
     needed = PETSC_FALSE;
-    if (last >= 0) PetscCall(Needed(h, active, last - h->p, &needed));
+    if (last >= 0) PetscCall(SemidefiniteNeeded(h, active, last - h->p, &needed));
     if (needed) d[last] = 0;
   }
   for (PetscInt i = 0; i < h->n; i++) z[i] += i < h->p ? d[i] : step * d[i];
@@ -332,9 +333,10 @@ static PetscErrorCode Advance(const Floating *h, PetscReal d[], PetscBool active
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The open contact that penetrates most at the residual r, or, after many changes, the last one that does; -1: none does. */
-static PetscInt Penetrates(const Floating *h, const PetscBool active[], const PetscReal z[], const PetscReal r[],
-                           PetscBool any)
+/* The open contact that penetrates most at the residual r, or, after many changes, the last one that does; -1: none
+   does. */
+static PetscInt SemidefinitePenetrates(const Floating *h, const PetscBool active[], const PetscReal z[],
+                                       const PetscReal r[], PetscBool any)
 {
   PetscReal size = 0, most;
   PetscInt worst = -1;
@@ -350,7 +352,8 @@ static PetscInt Penetrates(const Floating *h, const PetscBool active[], const Pe
 }
 
 /* The primal method. The solution on each set is corrected once before it is judged. */
-static PetscErrorCode Improve(Floating *h, PetscBool active[], PetscReal z[], PetscInt *its, HycoLCPStatus *status)
+static PetscErrorCode SemidefiniteImprove(Floating *h, PetscBool active[], PetscReal z[], PetscInt *its,
+                                          HycoLCPStatus *status)
 {
   const PetscInt most = 50 + 10 * h->n;
   PetscReal *r, *d;
@@ -358,14 +361,14 @@ static PetscErrorCode Improve(Floating *h, PetscBool active[], PetscReal z[], Pe
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(h->n, &r, h->n, &d));
-  PetscCall(Begin(h, active, z, &exists));
+  PetscCall(SemidefiniteBegin(h, active, z, &exists));
   *status = exists ? HYCO_LCP_LIMIT : HYCO_LCP_RAY;
   for (PetscInt k = 0; k < most && *status == HYCO_LCP_LIMIT; k++) {
     PetscBool singular = PETSC_FALSE;
     PetscInt worst = -1;
 
-    Residual(h, z, r);
-    if (whole) worst = Penetrates(h, active, z, r, (PetscBool)(2 * k > most));
+    SemidefiniteResidual(h, z, r);
+    if (whole) worst = SemidefinitePenetrates(h, active, z, r, (PetscBool)(2 * k > most));
     if (worst >= 0) active[worst] = PETSC_TRUE;
     if (whole && worst < 0 && corrected) *status = HYCO_LCP_SOLVED;
     if (*status == HYCO_LCP_SOLVED) break;
@@ -373,7 +376,7 @@ static PetscErrorCode Improve(Floating *h, PetscBool active[], PetscReal z[], Pe
     PetscCall(SolveChange(h, r, active, d, &singular));
     if (singular || h->k > h->p + FEW) *status = HYCO_LCP_SINGULAR;
     if (singular) break;
-    PetscCall(Advance(h, d, active, z, &whole));
+    PetscCall(SemidefiniteAdvance(h, d, active, z, &whole));
     (*its)++;
   }
   PetscCall(PetscFree2(r, d));
@@ -389,16 +392,16 @@ static PetscErrorCode TakeExact(Floating *h, PetscBool active[], PetscBool *sing
   PetscCall(PetscMalloc1(h->m, &violates));
   PetscCall(SolveOnSet(h, active, singular));
   *exact = (PetscBool) !*singular;
-  if (*exact) PetscCall(Violations(h, active, violates));
+  if (*exact) PetscCall(SemidefiniteViolations(h, active, violates));
   for (PetscInt i = 0; *exact && i < h->m; i++) *exact = (PetscBool)!violates[i];
   PetscCall(PetscFree(violates));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The proximal method, and from its set the exact solution; without a solution, or with one that its set does not have, the
-   primal method. Where the set leaves a motion free, the nearest solution stays. */
-static PetscErrorCode Continue(const HycoActiveSet *e, const HycoLCP *lcp, PetscBool active[], PetscReal z[],
-                               PetscInt *its, HycoLCPStatus *status)
+/* The proximal method, and from its set the exact solution; without a solution, or with one that its set does not have,
+   the primal method. Where the set leaves a motion free, the nearest solution stays. */
+static PetscErrorCode SemidefiniteContinue(const HycoActiveSet *e, const HycoLCP *lcp, PetscBool active[],
+                                           PetscReal z[], PetscInt *its, HycoLCPStatus *status)
 {
   Floating *h = (Floating *)e->ctx;
   PetscReal *found;
@@ -412,7 +415,7 @@ static PetscErrorCode Continue(const HycoActiveSet *e, const HycoLCP *lcp, Petsc
   if (!exact && !singular) {
     HycoLCPStatus other = HYCO_LCP_LIMIT;
 
-    PetscCall(Improve(h, active, z, its, &other));
+    PetscCall(SemidefiniteImprove(h, active, z, its, &other));
     exact = (PetscBool)(other == HYCO_LCP_SOLVED);
     if (exact) *status = other;
   }
@@ -426,14 +429,14 @@ static PetscErrorCode Continue(const HycoActiveSet *e, const HycoLCP *lcp, Petsc
 #define UNBALANCED 1e-12 /* share of the terms of equilibrium: more, and the solution is corrected once */
 
 /* Corrects the solution on the set where the round-off of large gaps leaves a part of a tiny load. */
-static PetscErrorCode Correct(Floating *h, PetscBool active[], PetscReal z[])
+static PetscErrorCode SemidefiniteCorrect(Floating *h, PetscBool active[], PetscReal z[])
 {
   PetscReal *r, *d;
   PetscBool singular, off = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(h->n, &r, h->n, &d));
-  Residual(h, z, r);
+  SemidefiniteResidual(h, z, r);
   for (PetscInt i = 0; i < h->p; i++) {
     PetscReal size = PetscAbsReal(h->q[i]);
 
@@ -448,9 +451,9 @@ static PetscErrorCode Correct(Floating *h, PetscBool active[], PetscReal z[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bodies without loads, which carry no force, from x = 0: they stay where they are, or move as little as contact asks for.
-   Forces of round-off would be a solution relative to nothing. */
-static PetscErrorCode Unload(Floating *h, PetscBool active[], PetscBool *done)
+/* Bodies without loads, which carry no force, from x = 0: they stay where they are, or move as little as contact asks
+   for. Forces of round-off would be a solution relative to nothing. */
+static PetscErrorCode SemidefiniteUnload(Floating *h, PetscBool active[], PetscBool *done)
 {
   PetscInt *row;
 
@@ -467,8 +470,8 @@ static PetscErrorCode Unload(Floating *h, PetscBool active[], PetscBool *done)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Holds the motions that no contact meets, as where friction alone would hold them, and takes the round-off of the loads
-   from them: M and q then are copies. A motion under a load is left free. */
+/* Holds the motions that no contact meets, as where friction alone would hold them, and takes the round-off of the
+   loads from them: M and q then are copies. A motion under a load is left free. */
 static PetscErrorCode HoldFree(HycoLCP *lcp, PetscReal **M, PetscReal **q)
 {
   const PetscInt p = lcp->p;
@@ -510,7 +513,8 @@ static PetscErrorCode HoldFree(HycoLCP *lcp, PetscReal **M, PetscReal **q)
 
 /* For lcp->p > 0; z = (x_pinned, L). On one process, or alike on every rank. One by one: sets that change at once may
    leave a body without any contact, and the matrix singular. */
-static PetscErrorCode Solve(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its, HycoLCPStatus *status)
+static PetscErrorCode SemidefiniteSolve(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
+                                        HycoLCPStatus *status)
 {
   const PetscInt n = lcp->p + lcp->n;
   Floating h = {.p = lcp->p, .m = lcp->n, .n = n, .M = lcp->M, .q = lcp->q, .symmetric = lcp->symmetric, .z = z};
@@ -520,7 +524,7 @@ static PetscErrorCode Solve(const HycoLCP *lcp, PetscBool active[], PetscReal z[
                            .one_by_one = PETSC_TRUE,
                            .ctx = &h,
                            .solve = SolveOnSet,
-                           .violations = Violations,
+                           .violations = SemidefiniteViolations,
                            .monitor = lcp->monitor,
                            .monitor_ctx = lcp->monitor_ctx};
 
@@ -529,7 +533,7 @@ static PetscErrorCode Solve(const HycoLCP *lcp, PetscBool active[], PetscReal z[
   PetscFunctionBegin;
   *its = 0;
   *status = HYCO_LCP_SOLVED;
-  PetscCall(Unload(&h, active, &done));
+  PetscCall(SemidefiniteUnload(&h, active, &done));
   if (done) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc3(n, &h.a, n, &h.w, lcp->n, &h.idle));
   for (PetscInt i = lcp->p; i < n; i++)
@@ -538,8 +542,8 @@ static PetscErrorCode Solve(const HycoLCP *lcp, PetscBool active[], PetscReal z[
   if (h.flexibility == 0) h.flexibility = 1;
   FindIdle(&h);
   PetscCall(HycoActiveSetRun(&e, active, its, status));
-  if (*status == HYCO_LCP_SOLVED) PetscCall(Correct(&h, active, z));
-  if (*status != HYCO_LCP_SOLVED && lcp->symmetric) PetscCall(Continue(&e, lcp, active, z, its, status));
+  if (*status == HYCO_LCP_SOLVED) PetscCall(SemidefiniteCorrect(&h, active, z));
+  if (*status != HYCO_LCP_SOLVED && lcp->symmetric) PetscCall(SemidefiniteContinue(&e, lcp, active, z, its, status));
   PetscCall(PetscFree3(h.a, h.w, h.idle));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -552,7 +556,7 @@ PetscErrorCode HycoLCPSemidefinite(const HycoLCP *lcp, PetscBool active[], Petsc
 
   PetscFunctionBegin;
   PetscCall(HoldFree(&held, &M, &q));
-  PetscCall(Solve(&held, active, z, its, status));
+  PetscCall(SemidefiniteSolve(&held, active, z, its, status));
   HycoFreeAll(&M, &q);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

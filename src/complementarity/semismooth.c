@@ -3,18 +3,18 @@
 
       F(z) = z - P(z - rho w) = 0,     J = I - DP (I - rho M)
 
-  rho is 1/M_nn of the block's normal force and 1/mean M_tt of its other components. Rows in which DP is 0 (open contacts,
-  slip in 2D) are eliminated. The steps are halved until |F| decreases, at last down to tiny ones: a component that hardly
-  yields runs far past the border of its cone in a full step. It has no global convergence, so that there is
-  a chain of starts: the given forces; the solution with the normal forces alone; forces after block Gauss-Seidel sweeps;
-  forces after steps in which the admissible forces are those of the last step (freeze); the proximal point method, whose
-  problems M + alpha, q - alpha z_k are regular where M has no full rank (P. Alart, A. Curnier, Comput. Methods Appl.
-  Mech. Engng 92 (1991) 353-375; V. Acary, M. Bremond, O. Huber, in: Advanced Topics in Nonsmooth Dynamics, Springer 2018,
-  375-457). With nonnegative forces only, it is the active set method with a line search.
+  rho is 1/M_nn of the block's normal force and 1/mean M_tt of its other components. Rows in which DP is 0 (open
+  contacts, slip in 2D) are eliminated. The steps are halved until |F| decreases, at last down to tiny ones: a component
+  that hardly yields runs far past the border of its cone in a full step. It has no global convergence, so that there is
+  a chain of starts: the given forces; the solution with the normal forces alone; forces after block Gauss-Seidel
+  sweeps; forces after steps in which the admissible forces are those of the last step (freeze); the proximal point
+  method, whose problems M + alpha, q - alpha z_k are regular where M has no full rank (P. Alart, A. Curnier, Comput.
+  Methods Appl. Mech. Engng 92 (1991) 353-375; V. Acary, M. Bremond, O. Huber, in: Advanced Topics in Nonsmooth
+  Dynamics, Springer 2018, 375-457). With nonnegative forces only, it is the active set method with a line search.
 
-  Floating bodies: the first p entries of z are displacements with w = 0, scaled to forces by a typical flexibility. They
-  start from the displacements that close the contacts with a force: otherwise every contact looks open. The sweeps are
-  replaced by the solution in which every contact is closed and sticks.
+  Floating bodies: the first p entries of z are displacements with w = 0, scaled to forces by a typical flexibility.
+  They start from the displacements that close the contacts with a force: otherwise every contact looks open. The sweeps
+  are replaced by the solution in which every contact is closed and sticks.
 */
 #include "semismooth.h"
 #include <petscblaslapack.h>
@@ -54,16 +54,16 @@ typedef struct {
   PetscReal start;                /* the largest force at the start */
   PetscReal judged;               /* |F| without the round-off of the loads on free unknowns */
   HycoConeStep *linear;
-  PetscBool slides; /* no forces balance the loads */
-  PetscBool near;   /* nor did they in an earlier problem of the path */
-  PetscInt rubs;    /* blocks with friction */
+  PetscBool no_equilibrium; /* no forces balance the loads */
+  PetscBool near;           /* nor did they in an earlier problem of the path */
+  PetscInt has_friction;    /* blocks with friction */
   PetscBool smooth; /* floating bodies, and a coefficient of friction is 0: J may lack rank along their motions */
   PetscBool soft;   /* the scales are those without motions on soft supports */
   PetscInt its;
 } Newton;
 
 /* The problem that is solved now. */
-static void Pose(Newton *h, const PetscReal M[], const PetscReal q[])
+static void SemismoothSetCones(Newton *h, const PetscReal M[], const PetscReal q[])
 {
   /* A factor stays valid while only q changes. */
   if (M != h->linear->M) HycoConeStepSetMatrix(h->linear, M);
@@ -147,7 +147,7 @@ static PetscErrorCode SetScales(Newton *h, PetscBool *soft)
 }
 
 /* w = q + M z */
-static PetscErrorCode Slack(Newton *h, const PetscReal z[])
+static PetscErrorCode SemismoothSlack(Newton *h, const PetscReal z[])
 {
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(h->w, h->q, h->n));
@@ -158,7 +158,7 @@ static PetscErrorCode Slack(Newton *h, const PetscReal z[])
 /* y and F at z with the slacks w; *norm = |F|_2, *size: the size of the forces, to which it is compared. F = z - P(z -
    rho w), zero at a solution; without bounds, as of free unknowns, F = rho w. Newton's method works on |F|, and the
    solution is judged without what no forces can balance. */
-static PetscErrorCode Evaluate(Newton *h, const PetscReal z[], PetscReal *norm, PetscReal *size)
+static PetscErrorCode SemismoothEvaluate(Newton *h, const PetscReal z[], PetscReal *norm, PetscReal *size)
 {
   PetscReal sum = 0, judged = 0, most = 0, least = 0;
 
@@ -186,11 +186,11 @@ static PetscErrorCode Evaluate(Newton *h, const PetscReal z[], PetscReal *norm, 
 }
 
 /* w, y and F at z. */
-static PetscErrorCode Residual(Newton *h, const PetscReal z[], PetscReal *norm, PetscReal *size)
+static PetscErrorCode SemismoothResidual(Newton *h, const PetscReal z[], PetscReal *norm, PetscReal *size)
 {
   PetscFunctionBegin;
-  PetscCall(Slack(h, z));
-  PetscCall(Evaluate(h, z, norm, size));
+  PetscCall(SemismoothSlack(h, z));
+  PetscCall(SemismoothEvaluate(h, z, norm, size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -201,16 +201,16 @@ static PetscErrorCode DeriveAt(Newton *h, const PetscReal z[])
   PetscInt changes;
 
   PetscFunctionBegin;
-  PetscCall(Residual(h, z, &norm, &size));
+  PetscCall(SemismoothResidual(h, z, &norm, &size));
   PetscCall(HycoConeStepDerive(h->linear, h->blocks, h->y, &changes));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* z + t s with the first t = 1, 1/2, ..., `shortest` that decreases |F|; *less: there is one. Else z is unchanged. w changes by
-   t M s; near the solution it is computed anew, without the round-off of former changes. Where |F| is round-off it is
-   not searched for a lucky decrease. */
-static PetscErrorCode Search(Newton *h, PetscReal shortest, PetscReal z[], PetscReal *norm, PetscReal *size,
-                             PetscBool *less)
+/* z + t s with the first t = 1, 1/2, ..., `shortest` that decreases |F|; *less: there is one. Else z is unchanged. w
+   changes by t M s; near the solution it is computed anew, without the round-off of former changes. Where |F| is
+   round-off it is not searched for a lucky decrease. */
+static PetscErrorCode SemismoothSearch(Newton *h, PetscReal shortest, PetscReal z[], PetscReal *norm, PetscReal *size,
+                                       PetscBool *less)
 {
   /* Near round-off only the full step is tried, and half is enough. */
   const PetscReal before = *norm, least = before <= SOLVED * *size ? 1 : shortest;
@@ -228,24 +228,24 @@ static PetscErrorCode Search(Newton *h, PetscReal shortest, PetscReal z[], Petsc
       trial[i] = z[i] + t * h->step[i];
       h->w[i] = w[i] + t * change[i];
     }
-    if (near) PetscCall(Slack(h, trial));
-    PetscCall(Evaluate(h, trial, norm, size));
+    if (near) PetscCall(SemismoothSlack(h, trial));
+    PetscCall(SemismoothEvaluate(h, trial, norm, size));
     /* Armijo's condition on |F|. */
     *less = (PetscBool)(*norm < (1 - share * t) * before);
   }
   if (*less) {
     PetscCall(PetscArraycpy(z, trial, h->n));
     /* Passing into the neighbourhood of the solution: w anew, without the drift of updates. */
-    if (!near && *norm <= NEAR * *size) PetscCall(Residual(h, z, norm, size));
+    if (!near && *norm <= NEAR * *size) PetscCall(SemismoothResidual(h, z, norm, size));
   } else {
     PetscCall(PetscArraycpy(h->w, w, h->n));
-    PetscCall(Evaluate(h, z, norm, size));
+    PetscCall(SemismoothEvaluate(h, z, norm, size));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Passes an iteration to the monitor: the blocks with a force, and the rows of J that joined or left the kept ones. */
-static PetscErrorCode Show(const Newton *h, const PetscReal z[], PetscInt changes)
+static PetscErrorCode SemismoothShow(const Newton *h, const PetscReal z[], PetscInt changes)
 {
   PetscInt n_active = 0;
 
@@ -264,7 +264,8 @@ static PetscErrorCode Show(const Newton *h, const PetscReal z[], PetscInt change
 
 /* The step to the solution on the present states: far from a solution directly, with fewer products with M, near it by
    its residual, which takes round-off away; `least`: by least squares. */
-static PetscErrorCode Step(Newton *h, const PetscReal z[], PetscBool near, PetscBool least, PetscBool *regular)
+static PetscErrorCode SemismoothStep(Newton *h, const PetscReal z[], PetscBool near, PetscBool least,
+                                     PetscBool *regular)
 {
   PetscBool served = PETSC_FALSE;
 
@@ -283,52 +284,53 @@ static PetscErrorCode Step(Newton *h, const PetscReal z[], PetscBool near, Petsc
 }
 
 /* One step from z, and its search; a J without full rank, or one that is nearly singular, by least squares. */
-static PetscErrorCode Improve(Newton *h, PetscReal z[], PetscReal *norm, PetscReal *size, PetscBool *regular,
-                              PetscBool *less)
+static PetscErrorCode SemismoothImprove(Newton *h, PetscReal z[], PetscReal *norm, PetscReal *size, PetscBool *regular,
+                                        PetscBool *less)
 {
   const PetscReal before = *norm;
   const PetscBool lagged = h->linear->lagged;
 
   PetscFunctionBegin;
   *less = PETSC_FALSE;
-  PetscCall(Step(h, z, (PetscBool)(*norm <= NEAR * *size), PETSC_FALSE, regular));
+  PetscCall(SemismoothStep(h, z, (PetscBool)(*norm <= NEAR * *size), PETSC_FALSE, regular));
   /* By least squares below: else a body would run away along a motion that no force acts on. */
   if (*regular && !(h->smooth && h->linear->nearly_singular && h->linear->m <= MOST_LEAST))
-    PetscCall(Search(h, LEAST_STEP, z, norm, size, less));
+    PetscCall(SemismoothSearch(h, LEAST_STEP, z, norm, size, less));
   /* A new factor where the present one does not contract; the next step begins with it. */
   if (*less && lagged && *norm > CONTRACTS * before) PetscCall(HycoConeStepRenew(h->linear));
   if (!*less && *norm > SOLVED * *size &&
       !(h->smooth && h->linear->nearly_singular)) { /* by the residual, with a factor of J itself */
     PetscCall(HycoConeStepRenew(h->linear));
-    PetscCall(Step(h, z, PETSC_TRUE, PETSC_FALSE, regular));
+    PetscCall(SemismoothStep(h, z, PETSC_TRUE, PETSC_FALSE, regular));
     /* Not where forces are not unique: proximal steps find those near the last ones. */
     if (*regular)
-      PetscCall(Search(h, h->linear->nearly_singular && !h->soft ? LEAST_STEP : TINY_STEP, z, norm, size, less));
+      PetscCall(
+          SemismoothSearch(h, h->linear->nearly_singular && !h->soft ? LEAST_STEP : TINY_STEP, z, norm, size, less));
   }
   /* Nothing to gain from least squares: the step was good, J is regular, or |F| is round-off already. */
   if (*less || !h->linear->nearly_singular || *norm <= SOLVED * *size) PetscFunctionReturn(PETSC_SUCCESS);
   if (!h->linear->m || h->linear->m > MOST_LEAST) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Step(h, z, PETSC_TRUE, PETSC_TRUE, regular));
-  if (*regular) PetscCall(Search(h, LEAST_STEP, z, norm, size, less));
+  PetscCall(SemismoothStep(h, z, PETSC_TRUE, PETSC_TRUE, regular));
+  if (*regular) PetscCall(SemismoothSearch(h, LEAST_STEP, z, norm, size, less));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Newton's method from z. Ends where |F| is round-off, does not decrease, or J is singular. */
-static PetscErrorCode Iterate(Newton *h, PetscReal z[], HycoLCPStatus *status)
+static PetscErrorCode SemismoothIterate(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   const PetscInt most = h->lcp->max_its ? h->lcp->max_its : MOST_ITS;
   PetscReal norm, size;
   PetscBool regular = PETSC_TRUE, less = PETSC_TRUE;
 
   PetscFunctionBegin;
-  PetscCall(Residual(h, z, &norm, &size));
+  PetscCall(SemismoothResidual(h, z, &norm, &size));
   for (PetscInt k = 0; k < most && norm > ENOUGH * size && regular && less; k++) {
     PetscInt changes;
 
     PetscCall(HycoConeStepDerive(h->linear, h->blocks, h->y, &changes));
-    PetscCall(Improve(h, z, &norm, &size, &regular, &less));
+    PetscCall(SemismoothImprove(h, z, &norm, &size, &regular, &less));
     h->its++;
-    PetscCall(Show(h, z, changes));
+    PetscCall(SemismoothShow(h, z, changes));
   }
   /* By the residual alone, whatever ended the loop. */
   *status = h->judged <= SOLVED * size ? HYCO_LCP_SOLVED : regular ? HYCO_LCP_LIMIT : HYCO_LCP_SINGULAR;
@@ -337,13 +339,13 @@ static PetscErrorCode Iterate(Newton *h, PetscReal z[], HycoLCPStatus *status)
 
 /* Sweeps of block Gauss-Seidel from z: each block takes one projected step, which is short enough to decrease the
    energy of a symmetric problem. The step is 1 over a row-sum bound of the block's matrix. */
-static PetscErrorCode Sweep(Newton *h, PetscInt sweeps, PetscReal z[])
+static PetscErrorCode SemismoothSweep(Newton *h, PetscInt sweeps, PetscReal z[])
 {
   const HycoBlocks *b = h->blocks;
   PetscReal y[HYCO_MAX_BLOCK], next[HYCO_MAX_BLOCK];
 
   PetscFunctionBegin;
-  PetscCall(Slack(h, z));
+  PetscCall(SemismoothSlack(h, z));
   for (PetscInt s = 0; s < sweeps; s++) {
     for (PetscInt k = 0; k < b->n; k++) {
       const PetscInt first = b->row[k], size = b->row[k + 1] - first;
@@ -396,7 +398,7 @@ static PetscErrorCode FitMotions(Newton *h, const PetscBool in[], const PetscRea
 }
 
 /* Whether the forces of block k are inside its cone: slightly larger tangential ones are admissible too. */
-static PetscErrorCode Sticks(const Newton *h, PetscInt k, const PetscReal z[], PetscBool *sticks)
+static PetscErrorCode SemismoothIsSticking(const Newton *h, PetscInt k, const PetscReal z[], PetscBool *sticks)
 {
   const PetscInt size = h->blocks->row[k + 1] - h->blocks->row[k];
   PetscReal more[HYCO_MAX_BLOCK], admitted[HYCO_MAX_BLOCK];
@@ -410,7 +412,7 @@ static PetscErrorCode Sticks(const Newton *h, PetscInt k, const PetscReal z[], P
 
 /* Displacements x of floating bodies for given forces: those that close the gaps of the blocks with a force, and where
    these are inside their cones let nothing slip. */
-static PetscErrorCode Consistent(Newton *h, PetscReal z[])
+static PetscErrorCode SemismoothConsistent(Newton *h, PetscReal z[])
 {
   const HycoBlocks *b = h->blocks;
   PetscBool *in;
@@ -418,12 +420,12 @@ static PetscErrorCode Consistent(Newton *h, PetscReal z[])
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(h->n, &in));
   PetscCall(PetscArrayzero(z, h->p));
-  PetscCall(Slack(h, z));
+  PetscCall(SemismoothSlack(h, z));
   for (PetscInt k = 0; k < b->n; k++) {
     const PetscInt first = h->p + b->row[k];
     PetscBool sticks;
 
-    PetscCall(Sticks(h, k, z + first, &sticks));
+    PetscCall(SemismoothIsSticking(h, k, z + first, &sticks));
     for (PetscInt i = first; i < h->p + b->row[k + 1]; i++) {
       in[i] = (PetscBool)(z[first] > 0 && (i == first || sticks));
       /* A x = -w closes the gaps that the given forces leave. */
@@ -454,17 +456,17 @@ static PetscErrorCode ShortenMotions(Newton *h, PetscReal z[])
 }
 
 /* Admissible forces, and displacements without motions that have run away. */
-static PetscErrorCode Restart(Newton *h, PetscReal z[])
+static PetscErrorCode SemismoothRestart(Newton *h, PetscReal z[])
 {
   PetscFunctionBegin;
   PetscCall(HycoBlocksAdmit(h->blocks, z + h->p));
-  if (h->p) PetscCall(Consistent(h, z));
+  if (h->p) PetscCall(SemismoothConsistent(h, z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The motions x that leave the bodies where they were, without forces: no contact slips, and those with a force before
    just touch, in the sense of least squares. *none: no load acts on a motion. */
-static PetscErrorCode Stay(Newton *h, const PetscReal forces[], PetscReal x[], PetscBool *none)
+static PetscErrorCode SemismoothLeastSlip(Newton *h, const PetscReal forces[], PetscReal x[], PetscBool *none)
 {
   const HycoBlocks *b = h->blocks;
   PetscReal norm, size;
@@ -473,7 +475,7 @@ static PetscErrorCode Stay(Newton *h, const PetscReal forces[], PetscReal x[], P
   PetscFunctionBegin;
   *none = PETSC_TRUE;
   PetscCall(PetscArrayzero(x, h->n));
-  PetscCall(Residual(h, x, &norm, &size));
+  PetscCall(SemismoothResidual(h, x, &norm, &size));
   for (PetscInt i = 0; i < h->p; i++) *none = (PetscBool)(*none && PetscAbsReal(h->F[i]) <= SOLVED * size);
   if (!*none || !(h->start > 0)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscCalloc1(h->n, &in));
@@ -490,19 +492,19 @@ static PetscErrorCode Stay(Newton *h, const PetscReal forces[], PetscReal x[], P
 }
 
 /* Whether no forces are a solution with the motions x, which are z then. */
-static PetscErrorCode Take(Newton *h, const PetscReal x[], PetscReal z[], HycoLCPStatus *status)
+static PetscErrorCode SemismoothTryNoForce(Newton *h, const PetscReal x[], PetscReal z[], HycoLCPStatus *status)
 {
   PetscReal norm, size;
 
   PetscFunctionBegin;
-  PetscCall(Residual(h, x, &norm, &size));
+  PetscCall(SemismoothResidual(h, x, &norm, &size));
   *status = h->judged <= SOLVED * size ? HYCO_LCP_SOLVED : HYCO_LCP_LIMIT;
   if (*status == HYCO_LCP_SOLVED) PetscCall(PetscArraycpy(z, x, h->n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The same once the motions have opened what would overlap. */
-static PetscErrorCode Unload(Newton *h, PetscReal x[], PetscReal z[], HycoLCPStatus *status)
+static PetscErrorCode SemismoothUnload(Newton *h, PetscReal x[], PetscReal z[], HycoLCPStatus *status)
 {
   const HycoBlocks *b = h->blocks;
   PetscInt *row;
@@ -513,7 +515,7 @@ static PetscErrorCode Unload(Newton *h, PetscReal x[], PetscReal z[], HycoLCPSta
   for (PetscInt k = 0; k < b->n; k++) row[k] = h->p + b->row[k];
   PetscCall(HycoLCPUnload(h->n, h->p, b->n, row, h->M, h->q, x, &exists));
   PetscCall(PetscFree(row));
-  if (exists) PetscCall(Take(h, x, z, status));
+  if (exists) PetscCall(SemismoothTryNoForce(h, x, z, status));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -525,16 +527,16 @@ static PetscErrorCode ChooseStart(Newton *h, PetscReal z[])
   PetscFunctionBegin;
   if (!h->lcp->other) PetscFunctionReturn(PETSC_SUCCESS);
   HycoDuplicate(h->n, h->lcp->other, &other);
-  PetscCall(Residual(h, z, &given, &size));
-  if (h->p) PetscCall(Consistent(h, other));
-  PetscCall(Residual(h, other, &least, &size));
+  PetscCall(SemismoothResidual(h, z, &given, &size));
+  if (h->p) PetscCall(SemismoothConsistent(h, other));
+  PetscCall(SemismoothResidual(h, other, &least, &size));
   if (least < given) PetscCall(PetscArraycpy(z, other, h->n));
   PetscCall(PetscFree(other));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From the given forces. Floating bodies have no start without any, as every contact would look open. Without loads they
-   stay where they are; but forces that friction has locked in come before none with other motions. */
+/* From the given forces. Floating bodies have no start without any, as every contact would look open. Without loads
+   they stay where they are; but forces that friction has locked in come before none with other motions. */
 static PetscErrorCode FromForces(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   PetscBool none = PETSC_FALSE;
@@ -545,16 +547,17 @@ static PetscErrorCode FromForces(Newton *h, PetscReal z[], HycoLCPStatus *status
   *status = HYCO_LCP_LIMIT;
   if (h->p) {
     PetscCall(PetscMalloc1(h->n, &x));
-    PetscCall(Stay(h, z, x, &none));
-    if (none) PetscCall(Take(h, x, z, status));
+    PetscCall(SemismoothLeastSlip(h, z, x, &none));
+    if (none) PetscCall(SemismoothTryNoForce(h, x, z, status));
   }
   if (*status != HYCO_LCP_SOLVED && (!h->p || h->start > 0)) {
-    if (h->p) PetscCall(Consistent(h, z));
+    if (h->p) PetscCall(SemismoothConsistent(h, z));
     PetscCall(ChooseStart(h, z));
-    PetscCall(Iterate(h, z, status));
+    PetscCall(SemismoothIterate(h, z, status));
   }
   for (PetscInt i = h->p; i < h->n; i++) most = PetscMax(most, PetscAbsReal(z[i]));
-  if (none && (*status != HYCO_LCP_SOLVED || most <= LOCKED * h->start)) PetscCall(Unload(h, x, z, &unloaded));
+  if (none && (*status != HYCO_LCP_SOLVED || most <= LOCKED * h->start))
+    PetscCall(SemismoothUnload(h, x, z, &unloaded));
   if (unloaded == HYCO_LCP_SOLVED) *status = unloaded;
   PetscCall(PetscFree(x));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -596,8 +599,8 @@ static PetscErrorCode FromNormal(Newton *h, PetscReal z[], HycoLCPStatus *status
   if (*status != HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
   if (p) PetscCall(ShortenMotions(h, z));
   /* Without friction it is the solution. */
-  if (p && !h->rubs) PetscCall(Take(h, z, z, status));
-  if (!p || h->rubs || *status != HYCO_LCP_SOLVED) PetscCall(Iterate(h, z, status));
+  if (p && !h->has_friction) PetscCall(SemismoothTryNoForce(h, z, z, status));
+  if (!p || h->has_friction || *status != HYCO_LCP_SOLVED) PetscCall(SemismoothIterate(h, z, status));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -624,11 +627,11 @@ static PetscErrorCode FromStick(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscCall(HycoConeStepSolve(h->linear, h->F, (PetscBool)(h->linear->m <= MOST_LEAST), h->step, &regular));
   for (PetscInt i = 0; i < h->n; i++) z[i] = regular ? h->step[i] : 0;
   HycoDuplicate(h->n, z, &stuck);
-  PetscCall(Iterate(h, z, status));
+  PetscCall(SemismoothIterate(h, z, status));
   if (*status != HYCO_LCP_SOLVED) {
     PetscCall(PetscArraycpy(z, stuck, h->n));
-    PetscCall(Restart(h, z));
-    PetscCall(Iterate(h, z, status));
+    PetscCall(SemismoothRestart(h, z));
+    PetscCall(SemismoothIterate(h, z, status));
   }
   PetscCall(PetscFree(stuck));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -656,19 +659,19 @@ static PetscErrorCode FromFrozen(Newton *h, PetscReal z[], HycoLCPStatus *status
       if (cone->ops->freeze)
         PetscCall((*cone->ops->freeze)(cone, b->data + b->at[k], z + h->p + b->row[k], frozen->data + b->at[k]));
     }
-    PetscCall(Iterate(h, z, status));
+    PetscCall(SemismoothIterate(h, z, status));
   }
   h->blocks = b;
   PetscCall(HycoBlocksDestroy(&frozen));
-  PetscCall(Iterate(h, z, status));
+  PetscCall(SemismoothIterate(h, z, status));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* From z, then after sweeps; floating bodies from stick. */
-static PetscErrorCode Starts(Newton *h, PetscReal z[], HycoLCPStatus *status)
+static PetscErrorCode SemismoothStarts(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   PetscFunctionBegin;
-  PetscCall(Iterate(h, z, status));
+  PetscCall(SemismoothIterate(h, z, status));
   if (*status == HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
   /* Sweeps over blocks cannot move a floating body. */
   if (h->p) {
@@ -677,27 +680,27 @@ static PetscErrorCode Starts(Newton *h, PetscReal z[], HycoLCPStatus *status)
   }
   /* Forces of a failed start may lie outside their cones. */
   PetscCall(HycoBlocksAdmit(h->blocks, z));
-  PetscCall(Sweep(h, MOST_SWEEPS, z));
-  PetscCall(Iterate(h, z, status));
+  PetscCall(SemismoothSweep(h, MOST_SWEEPS, z));
+  PetscCall(SemismoothIterate(h, z, status));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Newton's method on the problem itself from a copy of z, which its solution replaces; not one of many, where M has no full
-   rank: proximal steps end at the nearest. */
+/* Newton's method on the problem itself from a copy of z, which its solution replaces; not one of many, where M has no
+   full rank: proximal steps end at the nearest. */
 static PetscErrorCode TryFrom(Newton *h, PetscReal z[], PetscReal copy[], HycoLCPStatus *status)
 {
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(copy, z, h->n));
-  PetscCall(Iterate(h, copy, status));
+  PetscCall(SemismoothIterate(h, copy, status));
   if (h->linear->nearly_singular) *status = HYCO_LCP_SINGULAR;
   if (*status == HYCO_LCP_SOLVED) PetscCall(PetscArraycpy(z, copy, h->n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The proximal point method from z: it ends if z solves the problem of lcp, and further steps gain nothing, or after
-   many iterations. Proximal point problems are solved from the last z; if one fails, so does the method. For problems of
-   which Newton's method cycles; each step is strongly monotone, and has one solution. */
-static PetscErrorCode Proximal(Newton *h, PetscReal z[], HycoLCPStatus *status)
+   many iterations. Proximal point problems are solved from the last z; if one fails, so does the method. For problems
+   of which Newton's method cycles; each step is strongly monotone, and has one solution. */
+static PetscErrorCode SemismoothProximal(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   const size_t n = (size_t)h->n;
   PetscReal *M, *q, *alpha, *copy, before = PETSC_MAX_REAL;
@@ -714,11 +717,11 @@ static PetscErrorCode Proximal(Newton *h, PetscReal z[], HycoLCPStatus *status)
     PetscReal norm, size;
 
     for (size_t i = 0; i < n; i++) q[i] = h->q0[i] - alpha[i] * z[i];
-    Pose(h, M, q);
-    PetscCall(Starts(h, z, status));
+    SemismoothSetCones(h, M, q);
+    PetscCall(SemismoothStarts(h, z, status));
     done = (PetscBool)(*status != HYCO_LCP_SOLVED || h->its > MOST_ALL);
-    Pose(h, h->M0, h->q0);
-    PetscCall(Residual(h, z, &norm, &size));
+    SemismoothSetCones(h, h->M0, h->q0);
+    PetscCall(SemismoothResidual(h, z, &norm, &size));
     /* The status of the original problem, not of the proximal one. */
     *status = h->judged <= SOLVED * size ? HYCO_LCP_SOLVED : HYCO_LCP_LIMIT;
     done = (PetscBool)(done || norm <= TIGHT * size || (*status == HYCO_LCP_SOLVED && norm > before / 2));
@@ -733,7 +736,7 @@ static PetscErrorCode Proximal(Newton *h, PetscReal z[], HycoLCPStatus *status)
 }
 
 /* Whether no forces of the cones balance the loads on floating bodies: then z has those that come nearest. */
-static PetscErrorCode SlidesAway(Newton *h, PetscReal z[])
+static PetscErrorCode HasNoEquilibrium(Newton *h, PetscReal z[])
 {
   const PetscInt p = h->p, rows = h->n - p;
   PetscReal *A, *f, *r;
@@ -747,8 +750,8 @@ static PetscErrorCode SlidesAway(Newton *h, PetscReal z[])
     for (PetscInt j = 0; j < rows; j++) A[j * p + i] = h->M0[(size_t)(p + j) * (size_t)h->n + (size_t)i];
   }
   PetscCall(HycoBlocksBalance(h->blocks, p, A, f, h->lcp->rounding * h->flexibility, r, &exists));
-  h->slides = (PetscBool)!exists;
-  if (h->slides) PetscCall(PetscArraycpy(z + p, r, rows));
+  h->no_equilibrium = (PetscBool)!exists;
+  if (h->no_equilibrium) PetscCall(PetscArraycpy(z + p, r, rows));
   PetscCall(PetscFree3(A, f, r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -764,16 +767,16 @@ static PetscErrorCode FromBefore(Newton *h, PetscReal z[], HycoLCPStatus *status
   PetscFunctionBegin;
   HycoDuplicate(h->n, z, &given);
   /* Near where a body slides away, a search among forces that do not exist is the dearest. */
-  if (h->near) PetscCall(SlidesAway(h, z));
-  if (h->slides)
+  if (h->near) PetscCall(HasNoEquilibrium(h, z));
+  if (h->no_equilibrium)
     *status = HYCO_LCP_RAY;
-  else if (h->rubs || !h->p)
+  else if (h->has_friction || !h->p)
     PetscCall(FromForces(h, z, status));
   else
     PetscCall(FromNormal(h, z, status));
   /* Before other starts: no start would find any. */
-  if (*status != HYCO_LCP_SOLVED && !h->near) PetscCall(SlidesAway(h, z));
-  if (h->slides) *status = HYCO_LCP_RAY;
+  if (*status != HYCO_LCP_SOLVED && !h->near) PetscCall(HasNoEquilibrium(h, z));
+  if (h->no_equilibrium) *status = HYCO_LCP_RAY;
   /* Floating bodies have no soft motions: they are unknowns. */
   if (*status != HYCO_LCP_SOLVED && !h->p) PetscCall(SetScales(h, &soft));
   if (soft) {
@@ -782,29 +785,29 @@ static PetscErrorCode FromBefore(Newton *h, PetscReal z[], HycoLCPStatus *status
     if (*status != HYCO_LCP_SOLVED) PetscCall(FromNormal(h, z, status));
     if (*status != HYCO_LCP_SOLVED) PetscCall(SetScales(h, NULL));
   }
-  if (*status != HYCO_LCP_SOLVED && !h->slides) PetscCall(FromNormal(h, z, status));
+  if (*status != HYCO_LCP_SOLVED && !h->no_equilibrium) PetscCall(FromNormal(h, z, status));
   PetscCall(PetscFree(given));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The starts, one after the other. Scales are those of the original M for all. */
-static PetscErrorCode Chain(Newton *h, PetscReal z[], HycoLCPStatus *status)
+static PetscErrorCode SemismoothRunStarts(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   PetscFunctionBegin;
   PetscCall(SetScales(h, NULL));
   if (h->lcp->blocks) {
     PetscCall(FromBefore(h, z, status));
-    if (*status == HYCO_LCP_SOLVED || h->slides) PetscFunctionReturn(PETSC_SUCCESS);
+    if (*status == HYCO_LCP_SOLVED || h->no_equilibrium) PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(Starts(h, z, status));
+  PetscCall(SemismoothStarts(h, z, status));
   if (*status != HYCO_LCP_SOLVED && h->lcp->blocks) {
-    PetscCall(Restart(h, z));
+    PetscCall(SemismoothRestart(h, z));
     PetscCall(FromFrozen(h, z, status));
   }
   if (*status == HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Restart(h, z));
+  PetscCall(SemismoothRestart(h, z));
   /* Last: it solves a sequence of problems, each with a full flexibility. */
-  PetscCall(Proximal(h, z, status));
+  PetscCall(SemismoothProximal(h, z, status));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -817,7 +820,8 @@ struct _n_HycoConeFactor {
                                      contact */
 };
 
-/* Rows and columns of the free unknowns times a typical flexibility: M stays [0 A; -A^T W] in structure. Once for an M. */
+/* Rows and columns of the free unknowns times a typical flexibility: M stays [0 A; -A^T W] in structure. Once for an
+   M. */
 static PetscErrorCode ScaleMatrix(HycoConeFactor f, PetscInt p, PetscInt n, const PetscReal M[], PetscBool springs)
 {
   const size_t N = (size_t)n;
@@ -856,7 +860,7 @@ static PetscErrorCode ScaleFree(Newton *h, HycoConeFactor f, PetscReal z[])
     h->q0 = h->scaled;
     h->flexibility = f->flexibility;
   }
-  Pose(h, h->M0, h->q0);
+  SemismoothSetCones(h, h->M0, h->q0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -882,7 +886,7 @@ PetscErrorCode HycoConeFactorCreate(HycoConeFactor *factor)
 }
 
 /* The room for a problem. */
-static PetscErrorCode Release(HycoConeFactor f)
+static PetscErrorCode SemismoothRelease(HycoConeFactor f)
 {
   PetscFunctionBegin;
   if (!f->row) PetscFunctionReturn(PETSC_SUCCESS);
@@ -896,7 +900,7 @@ PetscErrorCode HycoConeFactorDestroy(HycoConeFactor *factor)
 {
   PetscFunctionBegin;
   if (!*factor) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Release(*factor));
+  PetscCall(SemismoothRelease(*factor));
   PetscCall(PetscFree(*factor));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -950,7 +954,7 @@ void HycoConeFactorGetPieces(HycoConeFactor f, PetscInt *n, const PetscReal *DP[
 }
 
 /* Makes the factor one for problems with these blocks. */
-static PetscErrorCode Adapt(HycoConeFactor f, PetscInt p, const HycoBlocks *blocks)
+static PetscErrorCode SemismoothAdapt(HycoConeFactor f, PetscInt p, const HycoBlocks *blocks)
 {
   PetscBool same = (PetscBool)(f->row && f->step.p == p && f->n_blocks == blocks->n);
 
@@ -958,7 +962,7 @@ static PetscErrorCode Adapt(HycoConeFactor f, PetscInt p, const HycoBlocks *bloc
   /* Equal numbers of blocks may still have other sizes. */
   if (same) PetscCall(PetscArraycmp(f->row, blocks->row, blocks->n + 1, &same));
   if (!same) {
-    PetscCall(Release(f));
+    PetscCall(SemismoothRelease(f));
     f->n_blocks = blocks->n;
     HycoDuplicate(blocks->n + 1, blocks->row, &f->row);
     PetscCall(PetscCalloc1(p + blocks->row[blocks->n] + 1, &f->rho));
@@ -968,8 +972,8 @@ static PetscErrorCode Adapt(HycoConeFactor f, PetscInt p, const HycoBlocks *bloc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* z: start and solution (p + n); lcp->blocks NULL: forces >= 0. On one process, or alike on every rank. Chain() tries
-   the starts one after the other until one converges. */
+/* z: start and solution (p + n); lcp->blocks NULL: forces >= 0. On one process, or alike on every rank.
+   SemismoothRunStarts() tries the starts one after the other until one converges. */
 PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *its, HycoLCPStatus *status)
 {
   const PetscInt n = lcp->p + lcp->n;
@@ -982,22 +986,22 @@ PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *it
   if (!lcp->blocks) h.blocks = nonnegative;
   if (!f) PetscCall(HycoConeFactorCreate(&own));
   if (own) f = own;
-  PetscCall(Adapt(f, lcp->p, h.blocks));
+  PetscCall(SemismoothAdapt(f, lcp->p, h.blocks));
   h.linear = &f->step;
   h.linear->symmetric = (PetscBool)(lcp->symmetric && !lcp->p);
   h.rho = f->rho;
   PetscCall(PetscMalloc5(n, &h.w, n, &h.y, n, &h.F, n, &h.step, 3 * n, &h.trial));
   for (PetscInt k = 0; k < h.blocks->n && h.p; k++) {
-    const PetscBool rubs = HycoBlockRubs(h.blocks, k);
+    const PetscBool has_friction = HycoBlockHasFriction(h.blocks, k);
 
-    h.rubs += rubs;
-    h.smooth = (PetscBool)(h.smooth || (!rubs && h.blocks->row[k + 1] - h.blocks->row[k] > 1));
+    h.has_friction += has_friction;
+    h.smooth = (PetscBool)(h.smooth || (!has_friction && h.blocks->row[k + 1] - h.blocks->row[k] > 1));
   }
   PetscCall(ScaleFree(&h, f, z));
   for (PetscInt i = h.p; i < n; i++) h.start = PetscMax(h.start, PetscAbsReal(z[i]));
   h.near = f->slid;
-  PetscCall(Chain(&h, z, status));
-  f->slid = (PetscBool)(f->slid || h.slides);
+  PetscCall(SemismoothRunStarts(&h, z, status));
+  f->slid = (PetscBool)(f->slid || h.no_equilibrium);
   if (lcp->sign) *lcp->sign = 0;
   /* Before DropRounding() and the scaling back: z is that of h's problem. */
   if ((lcp->cone || lcp->sign) && *status == HYCO_LCP_SOLVED) PetscCall(DeriveAt(&h, z));

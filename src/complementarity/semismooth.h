@@ -22,8 +22,8 @@ typedef struct {
   unknown (p) has E = L = 1.
 
   A is factored for a base DP. J then differs from its base J0 in the rows of the blocks whose DP has changed, which are
-  c rows P:  J = J0 + P R,  s = s0 - Z (I + R Z)^-1 R s0,  J0 s0 = b,  J0 Z = P. Columns of Z are kept with the factor, as
-  is the factor with the HycoConeStep, from one problem of a path to the next. Where too many rows have changed, or
+  c rows P:  J = J0 + P R,  s = s0 - Z (I + R Z)^-1 R s0,  J0 s0 = b,  J0 Z = P. Columns of Z are kept with the factor,
+  as is the factor with the HycoConeStep, from one problem of a path to the next. Where too many rows have changed, or
   I + R Z is nearly singular, the present DP becomes the base.
 */
 typedef struct {

@@ -97,7 +97,8 @@ static void AddUnknown(HycoConeStep *t, PetscInt first, PetscInt size, const Pet
 
 /* Column k of L: the direction of the longest of the rows R without their parts along the columns before; returns its
    length. Rank-revealing: a derivative of rank r has r such columns, and the others are noise. */
-static PetscReal Longest(PetscInt size, const PetscReal R[], PetscInt k, PetscReal L[HYCO_MAX_BLOCK][HYCO_MAX_BLOCK])
+static PetscReal SemismoothStepLongest(PetscInt size, const PetscReal R[], PetscInt k,
+                                       PetscReal L[HYCO_MAX_BLOCK][HYCO_MAX_BLOCK])
 {
   PetscReal most = 0;
 
@@ -121,7 +122,7 @@ static PetscReal Longest(PetscInt size, const PetscReal R[], PetscInt k, PetscRe
 }
 
 /* The rank of block k's DP: L spans its rows, E = DP L, whose columns become unknowns if `add`. */
-static PetscInt Factorise(HycoConeStep *t, PetscInt k, PetscBool add)
+static PetscInt SemismoothStepFactorise(HycoConeStep *t, PetscInt k, PetscBool add)
 {
   const PetscInt first = t->p + t->blocks->row[k], size = t->blocks->row[k + 1] - t->blocks->row[k];
   const PetscReal *D = t->DP + (size_t)k * HYCO_BLOCK;
@@ -129,7 +130,7 @@ static PetscInt Factorise(HycoConeStep *t, PetscInt k, PetscBool add)
 
   for (PetscInt a = 0; a < size; a++) {
     PetscReal E[HYCO_MAX_BLOCK] = {0};
-    const PetscReal length = Longest(size, D, a, L);
+    const PetscReal length = SemismoothStepLongest(size, D, a, L);
 
     if (!a) most = length;
     /* The rest of the rows is dependent: the rank is a. */
@@ -153,7 +154,7 @@ static PetscErrorCode TakeBase(HycoConeStep *t)
   PetscCall(PetscArraycpy(t->base, t->DP, (size_t)t->blocks->n * HYCO_BLOCK));
   /* Motions without a cone are unknowns of their own. */
   for (PetscInt i = 0; i < t->p; i++) AddUnknown(t, i, 1, &one, &one);
-  for (PetscInt k = 0; k < t->blocks->n; k++) t->rank[k] = t->base_rank[k] = Factorise(t, k, PETSC_TRUE);
+  for (PetscInt k = 0; k < t->blocks->n; k++) t->rank[k] = t->base_rank[k] = SemismoothStepFactorise(t, k, PETSC_TRUE);
   for (PetscInt i = 0; i < t->n; i++) {
     /* No columns of Z and no rows of Q yet for this base. */
     t->column[i] = -1;
@@ -172,9 +173,9 @@ static PetscBool IsNear(const HycoConeStep *t, PetscInt k)
   return PETSC_TRUE;
 }
 
-/* Lists the rows of DP that differ from the base, or those of blocks that are not near it; returns how many columns of Z
-   are missing for them. t->column: the column of Z of each row, -1: none yet. */
-static PetscInt Compare(HycoConeStep *t, PetscBool all)
+/* Lists the rows of DP that differ from the base, or those of blocks that are not near it; returns how many columns of
+   Z are missing for them. t->column: the column of Z of each row, -1: none yet. */
+static PetscInt SemismoothStepCompare(HycoConeStep *t, PetscBool all)
 {
   PetscInt missing = 0;
 
@@ -199,9 +200,9 @@ static PetscInt Compare(HycoConeStep *t, PetscBool all)
 }
 
 /* Whether row i of block k has no flexibility, as the tangential one along the normal of a plane of symmetry, and no
-   motion of a floating body moves it. It stays out of DP: its equation w = 0 could not be met by its own force, and A would
-   be singular. */
-static PetscBool Inflexible(const HycoConeStep *t, PetscInt k, PetscInt i)
+   motion of a floating body moves it. It stays out of DP: its equation w = 0 could not be met by its own force, and A
+   would be singular. */
+static PetscBool SemismoothStepInflexible(const HycoConeStep *t, PetscInt k, PetscInt i)
 {
   const PetscInt first = t->p + t->blocks->row[k], end = t->p + t->blocks->row[k + 1];
   PetscReal most = 0, own = t->M[(size_t)(first + i) * (size_t)(t->n + 1)];
@@ -219,11 +220,11 @@ static PetscBool Inflexible(const HycoConeStep *t, PetscInt k, PetscInt i)
 }
 
 /* Of all rows, once for an M. */
-static const PetscBool *Stiff(HycoConeStep *t)
+static const PetscBool *SemismoothStepStiff(HycoConeStep *t)
 {
   for (PetscInt k = 0; k < t->blocks->n && !t->has_stiff; k++) {
     for (PetscInt i = 0; i < t->blocks->row[k + 1] - t->blocks->row[k]; i++)
-      t->stiff[t->p + t->blocks->row[k] + i] = Inflexible(t, k, i);
+      t->stiff[t->p + t->blocks->row[k] + i] = SemismoothStepInflexible(t, k, i);
   }
   t->has_stiff = PETSC_TRUE;
   return t->stiff;
@@ -233,7 +234,7 @@ static const PetscBool *Stiff(HycoConeStep *t)
    and keeps the factor. */
 PetscErrorCode HycoConeStepDerive(HycoConeStep *t, const HycoBlocks *blocks, const PetscReal y[], PetscInt *changes)
 {
-  const PetscBool *stiff = Stiff(t);
+  const PetscBool *stiff = SemismoothStepStiff(t);
   PetscBool same = PETSC_TRUE;
 
   PetscFunctionBegin;
@@ -255,19 +256,19 @@ PetscErrorCode HycoConeStepDerive(HycoConeStep *t, const HycoBlocks *blocks, con
     }
     if (equal) continue;
     same = PETSC_FALSE;
-    t->rank[k] = Factorise(t, k, PETSC_FALSE);
+    t->rank[k] = SemismoothStepFactorise(t, k, PETSC_FALSE);
     *changes += PetscAbsInt(t->rank[k] - before);
   }
   if (t->factored && same) PetscFunctionReturn(PETSC_SUCCESS);
   t->updated = t->lagged = PETSC_FALSE;
   if (t->factored && t->info == 0) {
     const PetscInt most = PetscMin(HYCO_CONE_CHANGES, t->m / LEAST_SHARE);
-    PetscInt missing = Compare(t, PETSC_TRUE);
+    PetscInt missing = SemismoothStepCompare(t, PETSC_TRUE);
 
     /* Few changes: a low-rank update of the factor instead of a new one. */
     if (t->c <= most && t->n_columns + missing <= most) PetscFunctionReturn(PETSC_SUCCESS);
     /* Slips have turned in many contacts: an update for the others stands for J as long as it contracts. */
-    missing = Compare(t, PETSC_FALSE);
+    missing = SemismoothStepCompare(t, PETSC_FALSE);
     t->lagged = (PetscBool)(!t->nearly_singular && t->c <= most && t->n_columns + missing <= most);
     if (t->lagged) PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -284,7 +285,7 @@ PetscErrorCode HycoConeStepStick(HycoConeStep *t)
   for (PetscInt k = 0; k < t->blocks->n; k++) {
     const PetscInt size = t->blocks->row[k + 1] - t->blocks->row[k];
 
-    for (PetscInt i = 0; i < size; i++) t->DP[k * HYCO_BLOCK + i * (size + 1)] = !Inflexible(t, k, i);
+    for (PetscInt i = 0; i < size; i++) t->DP[k * HYCO_BLOCK + i * (size + 1)] = !SemismoothStepInflexible(t, k, i);
   }
   PetscCall(TakeBase(t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -293,7 +294,7 @@ PetscErrorCode HycoConeStepStick(HycoConeStep *t)
 /* -- A and its factor -- */
 
 /* Column by column, M E first; rows of L^T and columns of E are those of one block. */
-static void Assemble(HycoConeStep *t)
+static void SemismoothStepAssemble(HycoConeStep *t)
 {
   const PetscInt m = t->m;
   /* Free unknowns have E = L = 1: 1 - L^T E is 0 there. */
@@ -334,14 +335,14 @@ static void Assemble(HycoConeStep *t)
 }
 
 /* info > 0 is kept: a singular matrix is no error here. */
-static void Factor(HycoConeStep *t)
+static void SemismoothStepFactor(HycoConeStep *t)
 {
   const PetscBLASInt m = (PetscBLASInt)t->m;
   PetscReal least = PETSC_MAX_REAL, most = 0;
 
   /* Kept while DP and M are the same. */
   if (t->factored) return;
-  Assemble(t);
+  SemismoothStepAssemble(t);
   t->info = 0;
   if (m) LAPACKgetrf_(&m, &m, t->A, &m, t->pivot, &t->info);
   t->factored = PETSC_TRUE;
@@ -362,7 +363,7 @@ static PetscErrorCode LeastSquares(HycoConeStep *t, PetscBLASInt *info)
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(m, &value, lwork, &work));
-  Assemble(t);
+  SemismoothStepAssemble(t);
   /* gelss overwrites A. */
   t->factored = PETSC_FALSE;
   LAPACKgelss_(&m, &m, &one, t->A, &m, t->rhs, &m, value, &tol, &rank, work, (PetscBLASInt *)&lwork, info);
@@ -481,7 +482,8 @@ static const PetscReal *RowOfQ(HycoConeStep *t, PetscInt k, PetscInt i)
 }
 
 /* The change of row k's DP: *first row and size of its block. */
-static PetscInt Change(const HycoConeStep *t, PetscInt k, PetscInt *first, PetscReal change[HYCO_MAX_BLOCK])
+static PetscInt SemismoothStepChange(const HycoConeStep *t, PetscInt k, PetscInt *first,
+                                     PetscReal change[HYCO_MAX_BLOCK])
 {
   const PetscInt b = t->block[k], size = t->blocks->row[b + 1] - t->blocks->row[b];
   const size_t at = (size_t)b * HYCO_BLOCK + (size_t)((t->changed[k] - t->p - t->blocks->row[b]) * size);
@@ -492,7 +494,7 @@ static PetscInt Change(const HycoConeStep *t, PetscInt k, PetscInt *first, Petsc
 }
 
 /* The factor of I + R Z; *regular: it is not nearly singular. */
-static PetscErrorCode Update(HycoConeStep *t, PetscBool *regular)
+static PetscErrorCode SemismoothStepUpdate(HycoConeStep *t, PetscBool *regular)
 {
   const PetscBLASInt c = (PetscBLASInt)t->c;
   PetscBLASInt info = 0;
@@ -506,7 +508,7 @@ static PetscErrorCode Update(HycoConeStep *t, PetscBool *regular)
   for (PetscInt r = 0; r < c; r++) {
     PetscReal change[HYCO_MAX_BLOCK];
     PetscInt first;
-    const PetscInt size = Change(t, r, &first, change);
+    const PetscInt size = SemismoothStepChange(t, r, &first, change);
 
     for (PetscInt k = 0; k < c; k++) t->S[k * c + r] = r == k;
     for (PetscInt j = 0; j < size; j++) {
@@ -526,8 +528,8 @@ static PetscErrorCode Update(HycoConeStep *t, PetscBool *regular)
 }
 
 /* (I - rho M) s - rho q in row i of block k, for the step of the base, or its point (q). */
-static PetscReal Argument(const HycoConeStep *t, PetscInt k, PetscInt i, const PetscReal q[], const PetscReal b[],
-                          const PetscReal s[])
+static PetscReal SemismoothStepArgument(const HycoConeStep *t, PetscInt k, PetscInt i, const PetscReal q[],
+                                        const PetscReal b[], const PetscReal s[])
 {
   const PetscInt row = t->p + t->blocks->row[k] + i;
   PetscReal product;
@@ -537,9 +539,9 @@ static PetscReal Argument(const HycoConeStep *t, PetscInt k, PetscInt i, const P
   return s[row] + product - (q ? t->rho[row] * q[row] : 0);
 }
 
-/* s -= Z (I + R Z)^-1 R s; with q (b NULL) the right-hand side has changed with DP, too: s is a point, not a step. Rows in
-   which DP is now 0 are those of b without round-off: open contacts have no force. */
-static PetscErrorCode Correct(HycoConeStep *t, const PetscReal q[], const PetscReal b[], PetscReal s[])
+/* s -= Z (I + R Z)^-1 R s; with q (b NULL) the right-hand side has changed with DP, too: s is a point, not a step. Rows
+   in which DP is now 0 are those of b without round-off: open contacts have no force. */
+static PetscErrorCode SemismoothStepCorrect(HycoConeStep *t, const PetscReal q[], const PetscReal b[], PetscReal s[])
 {
   const PetscBLASInt one = 1, c = (PetscBLASInt)t->c, n = (PetscBLASInt)t->n;
   PetscBLASInt info = 0;
@@ -548,12 +550,12 @@ static PetscErrorCode Correct(HycoConeStep *t, const PetscReal q[], const PetscR
   for (PetscInt r = 0; r < c; r++) {
     PetscReal change[HYCO_MAX_BLOCK];
     PetscInt first;
-    const PetscInt size = Change(t, r, &first, change);
+    const PetscInt size = SemismoothStepChange(t, r, &first, change);
 
     t->small[r] = 0;
     for (PetscInt j = 0; j < size; j++) {
       /* The right-hand side with the new rows of DP, applied to the step of the base. */
-      if (change[j] != 0) t->small[r] -= change[j] * Argument(t, t->block[r], j, q, b, s);
+      if (change[j] != 0) t->small[r] -= change[j] * SemismoothStepArgument(t, t->block[r], j, q, b, s);
     }
   }
   if (c) LAPACKgetrs_("N", &c, &one, t->S, &c, t->small_pivot, t->small, &c, &info);
@@ -575,16 +577,16 @@ static PetscErrorCode Correct(HycoConeStep *t, const PetscReal q[], const PetscR
 
 /* The base is factored, and its update; if that is nearly singular the present DP becomes the base. After it t->A has a
    factor, and t->S that of the update. */
-static PetscErrorCode Prepare(HycoConeStep *t)
+static PetscErrorCode SemismoothStepPrepare(HycoConeStep *t)
 {
   PetscBool regular;
 
   PetscFunctionBegin;
-  Factor(t);
-  PetscCall(Update(t, &regular));
+  SemismoothStepFactor(t);
+  PetscCall(SemismoothStepUpdate(t, &regular));
   if (regular) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(TakeBase(t));
-  Factor(t);
+  SemismoothStepFactor(t);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -608,7 +610,7 @@ PetscErrorCode HycoConeStepSolve(HycoConeStep *t, const PetscReal b[], PetscBool
   PetscFunctionBegin;
   /* Least squares need the present matrix, not an update of another. */
   if (least) PetscCall(HycoConeStepRenew(t));
-  if (!least) PetscCall(Prepare(t));
+  if (!least) PetscCall(SemismoothStepPrepare(t));
   m = (PetscBLASInt)t->m;
   PetscCall(RightHandSide(t, b));
   PetscCall(PetscArraycpy(s, b, t->n));
@@ -616,7 +618,7 @@ PetscErrorCode HycoConeStepSolve(HycoConeStep *t, const PetscReal b[], PetscBool
   if (!least) info = t->info;
   if (!least && m && !info) LAPACKgetrs_("N", &m, &one, t->A, &m, t->pivot, t->rhs, &m, &info);
   if (!info) AddForces(t, t->rhs, s);
-  if (!least && !info) PetscCall(Correct(t, NULL, b, s));
+  if (!least && !info) PetscCall(SemismoothStepCorrect(t, NULL, b, s));
   for (PetscInt i = 0; i < t->n; i++) size += PetscAbsReal(s[i]);
   /* A nearly singular factor shows as infinite numbers. */
   *regular = (PetscBool)(info == 0 && !PetscIsInfOrNanReal(size));
@@ -654,7 +656,7 @@ static PetscErrorCode SolvePoints(HycoConeStep *t, PetscInt k, const PetscReal q
 
   PetscFunctionBegin;
   if (t->lagged) PetscCall(TakeBase(t));
-  PetscCall(Prepare(t));
+  PetscCall(SemismoothStepPrepare(t));
   m = (PetscBLASInt)t->m;
   info = t->info;
   PetscCall(PetscCalloc1((size_t)t->m * (size_t)k + 1, &rhs));
@@ -668,7 +670,7 @@ static PetscErrorCode SolvePoints(HycoConeStep *t, PetscInt k, const PetscReal q
   PetscCall(PetscArrayzero(z, t->n * k));
   for (PetscInt j = 0; j < k && !info; j++) {
     AddForces(t, rhs + j * t->m, z + j * t->n);
-    PetscCall(Correct(t, q + j * t->n, NULL, z + j * t->n));
+    PetscCall(SemismoothStepCorrect(t, q + j * t->n, NULL, z + j * t->n));
   }
   for (PetscInt i = 0; i < t->n * k; i++) size += PetscAbsReal(z[i]);
   *regular = (PetscBool)(info == 0 && !PetscIsInfOrNanReal(size));
@@ -719,11 +721,11 @@ static PetscInt SignOfFactor(const HycoConeStep *t)
 PetscErrorCode HycoConeStepSign(HycoConeStep *t, PetscInt *sign)
 {
   PetscFunctionBegin;
-  PetscCall(Prepare(t));
+  PetscCall(SemismoothStepPrepare(t));
   *sign = SignOfFactor(t);
   if (!t->lagged || *sign > 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(TakeBase(t));
-  PetscCall(Prepare(t));
+  PetscCall(SemismoothStepPrepare(t));
   *sign = SignOfFactor(t);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -40,8 +40,8 @@ enum { OPEN, UNDECIDED, CLOSED };
 
 /* By force and gap; M: of p unknowns and the contacts. A force counts if it is not small beside the largest, and its
    flexibility moves the gap by more than round-off. */
-static void States(PetscInt p, PetscInt n, const PetscReal M[], const PetscReal L[], const PetscReal w[],
-                   PetscReal size, PetscInt state[])
+static void TangentStates(PetscInt p, PetscInt n, const PetscReal M[], const PetscReal L[], const PetscReal w[],
+                          PetscReal size, PetscInt state[])
 {
   PetscReal most = 0;
 
@@ -56,8 +56,8 @@ static void States(PetscInt p, PetscInt n, const PetscReal M[], const PetscReal 
   }
 }
 
-/* Where the closed contacts do not determine the solution, small forces do: those above round-off close theirs. Whether there
-   are some. */
+/* Where the closed contacts do not determine the solution, small forces do: those above round-off close theirs. Whether
+   there are some. */
 static PetscBool CloseMore(PetscInt n, const PetscReal L[], PetscInt state[])
 {
   PetscReal most = 0;
@@ -73,7 +73,7 @@ static PetscBool CloseMore(PetscInt n, const PetscReal L[], PetscInt state[])
 }
 
 /* A looser question than the state: contacts for which it is false need no row of the derivative. */
-PetscBool HycoTangentMayTouch(PetscReal L, PetscReal w, PetscReal size)
+PetscBool HycoTangentMayClose(PetscReal L, PetscReal w, PetscReal size)
 {
   return (PetscBool)(L > 0 || w <= NEAR * size);
 }
@@ -91,7 +91,7 @@ static PetscBool IsFree(HycoTangent t, PetscBool rigid, const PetscReal M[], Pet
 }
 
 /* The columns of M of the set, scaled to entries of order 1: the rows of x and of contacts have different units. */
-static PetscErrorCode Factor(HycoTangent t, PetscBool rigid, const PetscReal M[], PetscBool *regular)
+static PetscErrorCode TangentFactor(HycoTangent t, PetscBool rigid, const PetscReal M[], PetscBool *regular)
 {
   const size_t n = (size_t)(t->p + t->n), m = (size_t)t->n_set;
   PetscBLASInt mb, info;
@@ -108,7 +108,8 @@ static PetscErrorCode Factor(HycoTangent t, PetscBool rigid, const PetscReal M[]
     t->scale[j] = diagonal > 0 ? 1 / PetscSqrtReal(diagonal) : 0;
     if (j >= (size_t)t->p) usual = PetscMax(usual, t->scale[j]);
   }
-  /* A contact at a node that a motion alone moves has no flexibility of its own: as the others, so that the motion's row sees it. */
+  /* A contact at a node that a motion alone moves has no flexibility of its own: as the others, so that the motion's
+     row sees it. */
   for (size_t j = (size_t)t->p; j < m; j++) t->scale[j] = t->scale[j] > 0 ? t->scale[j] : usual;
   for (size_t j = 0; j < m; j++) { /* without a diagonal: by the largest entry of the row, once the others are scaled */
     PetscReal largest = 0;
@@ -141,7 +142,7 @@ static PetscErrorCode Factor(HycoTangent t, PetscBool rigid, const PetscReal M[]
 }
 
 /* x = M_set^-1 x */
-static void Solve(HycoTangent t, PetscReal x[])
+static void TangentSolve(HycoTangent t, PetscReal x[])
 {
   const PetscBLASInt m = (PetscBLASInt)t->n_set, one = 1;
   PetscBLASInt info;
@@ -155,7 +156,7 @@ static void Solve(HycoTangent t, PetscReal x[])
 
 /* Without the contacts whose rows depend on closed ones, which these decide. S is the Schur complement of the undecided
    contacts; into and out couple them with the set. */
-static PetscErrorCode Condense(HycoTangent t, const PetscReal M[])
+static PetscErrorCode TangentCondense(HycoTangent t, const PetscReal M[])
 {
   const size_t n = (size_t)(t->p + t->n), m = (size_t)t->n_set;
   PetscInt kept = 0;
@@ -173,7 +174,7 @@ static PetscErrorCode Condense(HycoTangent t, const PetscReal M[])
       into[i] = M[at * n + (size_t)t->set[i]];
       out[i] = M[(size_t)t->set[i] * n + at];
     }
-    Solve(t, into);
+    TangentSolve(t, into);
     for (size_t i = 0; i < m; i++) left -= out[i] * into[i];
     for (size_t i = 0; i < m; i++) size += PetscAbsReal(out[i] * into[i]);
     /* A dropped contact's columns are overwritten by the next one's: into and out hold the kept ones, contiguous. */
@@ -214,8 +215,8 @@ static PetscErrorCode CreateFor(PetscInt p, PetscBool rigid, PetscInt n, const P
   PetscCall(PetscMalloc1(t->n_set + 1, &t->scale));
   PetscCall(PetscMalloc1(t->n_set + 1, &t->v));
   PetscCall(PetscMalloc1(t->n_set + 1, &t->ipiv));
-  PetscCall(Factor(t, rigid, M, regular));
-  if (*regular) PetscCall(Condense(t, M));
+  PetscCall(TangentFactor(t, rigid, M, regular));
+  if (*regular) PetscCall(TangentCondense(t, M));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -227,7 +228,7 @@ PetscErrorCode HycoTangentCreate(PetscInt p, PetscBool rigid, PetscInt n, const 
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n + 1, &state));
-  States(p, n, M, L, w, size, state);
+  TangentStates(p, n, M, L, w, size, state);
   *tangent = NULL;
   do {
     PetscCall(HycoTangentDestroy(tangent));
@@ -244,7 +245,7 @@ PetscInt HycoTangentUndecided(HycoTangent t)
 }
 
 /* The undecided contacts: q becomes their gaps' change, which is 0 where it is round-off; *kink: some are not. */
-static void Gaps(HycoTangent t, const PetscReal q[], int sign, PetscReal change[], PetscBool *kink)
+static void TangentGaps(HycoTangent t, const PetscReal q[], int sign, PetscReal change[], PetscBool *kink)
 {
   *kink = PETSC_FALSE;
   for (PetscInt k = 0; k < t->n_open; k++) {
@@ -273,10 +274,10 @@ PetscErrorCode HycoTangentSolve(HycoTangent t, const PetscReal q[], int sign, Pe
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < t->n_set; i++) t->v[i] = -q[t->set[i]];
-  Solve(t, t->v);
+  TangentSolve(t, t->v);
   PetscCall(PetscArrayzero(z, t->p + t->n));
   PetscCall(PetscCalloc2(t->n_open + 1, &change, t->n_open + 1, &force));
-  Gaps(t, q, sign, change, kink);
+  TangentGaps(t, q, sign, change, kink);
   if (*kink) PetscCall(HycoLCPLemke(t->n_open, t->S, change, 50 + 10 * t->n_open, force, &its, &status));
   /* Without a solution of the small problem the undecided contacts stay open. */
   for (PetscInt k = 0; k < t->n_open && status == HYCO_LCP_SOLVED; k++) {

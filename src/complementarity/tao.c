@@ -7,8 +7,8 @@
   Fischer-Burmeister function (T. S. Munson et al., INFORMS J. Comput. 13 (2001) 294-311). Both have absolute stopping
   criteria, so that the problem is scaled first: unit diagonal, right-hand side of size one. A type that a program
   registers gets the same: solution, bounds, Hessian, objective and its gradient H y - f. hyco's own types (tao_types.c)
-  get the unscaled problem as data. TAO's convergence flag is not relied on: the caller recomputes the residuals. A PETSc error
-  inside TAO is caught: it counts as not solved, like an iteration limit.
+  get the unscaled problem as data. TAO's convergence flag is not relied on: the caller recomputes the residuals. A
+  PETSc error inside TAO is caught: it counts as not solved, like an iteration limit.
 */
 #include <hycotao.h>
 
@@ -86,7 +86,7 @@ PetscErrorCode HycoTaoCreate(MPI_Comm comm, PetscObject owner, HycoTao *t)
 }
 
 /* Destroys what depends on the type and the size. */
-static PetscErrorCode Reset(HycoTao t)
+static PetscErrorCode TaoReset(HycoTao t)
 {
   PetscFunctionBegin;
   HycoDestroyAll(&t->tao, &t->J, &t->w, &t->d);
@@ -106,7 +106,7 @@ PetscErrorCode HycoTaoDestroy(HycoTao *t)
 {
   PetscFunctionBegin;
   if (!*t) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Reset(*t));
+  PetscCall(TaoReset(*t));
   PetscCall(ResetDense(*t));
   PetscCall(VecDestroy(&(*t)->placed));
   HycoFreeAll(&(*t)->last, t);
@@ -117,7 +117,7 @@ PetscErrorCode HycoTaoDestroy(HycoTao *t)
 PetscErrorCode HycoTaoSetType(HycoTao t, const char type[], PetscInt max_its)
 {
   PetscFunctionBegin;
-  if (t->tao && (strcmp(t->type, type) || t->max_its != max_its)) PetscCall(Reset(t));
+  if (t->tao && (strcmp(t->type, type) || t->max_its != max_its)) PetscCall(TaoReset(t));
   if (!t->tao) {
     PetscCall(PetscStrncpy(t->type, type, sizeof(t->type)));
     t->traits = HycoTaoTraits(type);
@@ -128,7 +128,7 @@ PetscErrorCode HycoTaoSetType(HycoTao t, const char type[], PetscInt max_its)
 
 /* Creates the Tao for a problem of y's size, with the user's options, unless it exists; *made: it is new. TAO 3.18
    cannot change its size, hence a new one. */
-static PetscErrorCode Prepare(HycoTao t, Vec y, PetscInt max_its, PetscBool *made)
+static PetscErrorCode TaoPrepare(HycoTao t, Vec y, PetscInt max_its, PetscBool *made)
 {
   PetscInt n, N;
   const char *prefix = NULL;
@@ -136,7 +136,7 @@ static PetscErrorCode Prepare(HycoTao t, Vec y, PetscInt max_its, PetscBool *mad
   PetscFunctionBegin;
   PetscCall(VecGetLocalSize(y, &n));
   PetscCall(VecGetSize(y, &N));
-  if (t->tao && (n != t->n || N != t->N)) PetscCall(Reset(t));
+  if (t->tao && (n != t->n || N != t->N)) PetscCall(TaoReset(t));
   *made = (PetscBool)!t->tao;
   if (!*made) PetscFunctionReturn(PETSC_SUCCESS);
   t->n = n;
@@ -179,7 +179,7 @@ static PetscErrorCode ReadOptions(HycoTao t)
 
 /* The number of iterations without halving the residual after which a run ends: small if the residual is small,
    where round-off dominates; larger above, and for first-order types, which may stagnate for a while. */
-static PetscInt Patience(const HycoTao t)
+static PetscInt TaoStallLimit(const HycoTao t)
 {
   /* The scaled problem has a size of one: this is its round-off. */
   if (t->best <= 1e-10) return 5;
@@ -187,7 +187,7 @@ static PetscInt Patience(const HycoTao t)
 }
 
 /* 1/2 y^T H y - f^T y and H y - f, by one product. */
-static PetscErrorCode Objective(Tao tao, Vec y, PetscReal *value, Vec gradient, void *ctx)
+static PetscErrorCode TaoObjective(Tao tao, Vec y, PetscReal *value, Vec gradient, void *ctx)
 {
   HycoTao t = (HycoTao)ctx;
   PetscScalar yHy, fy;
@@ -204,7 +204,7 @@ static PetscErrorCode Objective(Tao tao, Vec y, PetscReal *value, Vec gradient, 
 }
 
 /* H is set by TaoSetHessian() and the same at all y. */
-static PetscErrorCode Hessian(Tao tao, Vec y, Mat H, Mat P, void *ctx)
+static PetscErrorCode TaoHessian(Tao tao, Vec y, Mat H, Mat P, void *ctx)
 {
   PetscFunctionBegin;
   (void)tao, (void)y, (void)H, (void)P, (void)ctx; /* constant */
@@ -212,7 +212,7 @@ static PetscErrorCode Hessian(Tao tao, Vec y, Mat H, Mat P, void *ctx)
 }
 
 /* w = M z - f. w and z are complementary: TAO's form of the problem. */
-static PetscErrorCode Slack(Tao tao, Vec z, Vec w, void *ctx)
+static PetscErrorCode TaoSlack(Tao tao, Vec z, Vec w, void *ctx)
 {
   HycoTao t = (HycoTao)ctx;
 
@@ -224,7 +224,7 @@ static PetscErrorCode Slack(Tao tao, Vec z, Vec w, void *ctx)
 }
 
 /* The types overwrite J by their Newton matrix: each call restores M. */
-static PetscErrorCode Jacobian(Tao tao, Vec z, Mat J, Mat P, void *ctx)
+static PetscErrorCode TaoJacobian(Tao tao, Vec z, Mat J, Mat P, void *ctx)
 {
   HycoTao t = (HycoTao)ctx;
 
@@ -235,7 +235,7 @@ static PetscErrorCode Jacobian(Tao tao, Vec z, Mat J, Mat P, void *ctx)
 }
 
 /* TAO's own test; also ends iterations at round-off level or without progress. */
-static PetscErrorCode Converged(Tao tao, void *ctx)
+static PetscErrorCode TaoConverged(Tao tao, void *ctx)
 {
   HycoTao t = (HycoTao)ctx;
   TaoConvergedReason why;
@@ -250,7 +250,7 @@ static PetscErrorCode Converged(Tao tao, void *ctx)
   if (residual <= t->best / 2) {
     t->best = residual;
     t->best_at = it;
-  } else if (it - t->best_at >= Patience(t))
+  } else if (it - t->best_at >= TaoStallLimit(t))
     PetscCall(TaoSetConvergedReason(tao, t->best <= 1e-10 ? TAO_CONVERGED_USER : TAO_DIVERGED_USER));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -263,8 +263,8 @@ static PetscErrorCode SetBoundProblem(HycoTao t, PetscBool krylov)
   KSP ksp;
 
   PetscFunctionBegin;
-  PetscCall(TaoSetObjectiveAndGradient(t->tao, NULL, Objective, t));
-  PetscCall(TaoSetHessian(t->tao, t->H, t->H, Hessian, NULL));
+  PetscCall(TaoSetObjectiveAndGradient(t->tao, NULL, TaoObjective, t));
+  PetscCall(TaoSetHessian(t->tao, t->H, t->H, TaoHessian, NULL));
   /* 0 for the last: the initial residual may be as small as the solution's. */
   PetscCall(TaoSetTolerances(t->tao, 1e-13, 1e-14, 0));
   PetscCall(PetscObjectTypeCompare((PetscObject)t->H, MATSHELL, &shell));
@@ -288,8 +288,8 @@ static PetscErrorCode SetComplementarity(HycoTao t, PetscBool krylov)
   if (!t->w) PetscCall(VecDuplicate(t->F, &t->w));
   /* TAO's semismooth types scale the Jacobian in place: H must stay. */
   if (!t->J) PetscCall(MatDuplicate(t->H, MAT_COPY_VALUES, &t->J));
-  PetscCall(TaoSetConstraintsRoutine(t->tao, t->w, Slack, t));
-  PetscCall(TaoSetJacobianRoutine(t->tao, t->J, t->J, Jacobian, t));
+  PetscCall(TaoSetConstraintsRoutine(t->tao, t->w, TaoSlack, t));
+  PetscCall(TaoSetJacobianRoutine(t->tao, t->J, t->J, TaoJacobian, t));
   PetscCall(TaoSetTolerances(t->tao, 0, 0, 0));
   PetscCall(TaoSetFunctionLowerBound(t->tao, 1e-12)); /* its default, 1e-8, is too coarse; with 1e-20 it does not
                                                          stop */
@@ -304,23 +304,23 @@ static PetscErrorCode SetComplementarity(HycoTao t, PetscBool krylov)
 
 /* The part of a run that may fail inside TAO. Options and callbacks are set once for a Tao; H is the caller's at
    each call. */
-static PetscErrorCode Run(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylov, PetscInt *its, PetscBool *solved)
+static PetscErrorCode TaoRun(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylov, PetscInt *its, PetscBool *solved)
 {
   TaoConvergedReason why;
   PetscBool made;
 
   PetscFunctionBegin;
-  PetscCall(Prepare(t, y, t->max_its ? t->max_its : 2000, &made));
+  PetscCall(TaoPrepare(t, y, t->max_its ? t->max_its : 2000, &made));
   PetscCall(TaoSetSolution(t->tao, y));
   PetscCall(TaoSetVariableBounds(t->tao, lo, hi));
   /* The same test for all types, on the scaled residual. */
-  if (made) PetscCall(TaoSetConvergenceTest(t->tao, Converged, t));
+  if (made) PetscCall(TaoSetConvergenceTest(t->tao, TaoConverged, t));
   if (t->traits & HYCO_TAO_SEMISMOOTH) {
     if (made) PetscCall(SetComplementarity(t, krylov));
   } else if (made)
     PetscCall(SetBoundProblem(t, krylov));
   else
-    PetscCall(TaoSetHessian(t->tao, t->H, t->H, Hessian, NULL));
+    PetscCall(TaoSetHessian(t->tao, t->H, t->H, TaoHessian, NULL));
   if (made) {
     PetscErrorCode caught;
     char said[HYCO_LINE];
@@ -340,7 +340,7 @@ static PetscErrorCode Run(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylov, Pe
 
 /* y = d size y', lo and hi likewise; f' = d f / size; H' = d H d: unit diagonal, max |f'| = 1. Infinite bounds are
    kept. Diagonal entries below 1e-8 of the largest are raised, so that the scaling stays finite. */
-static PetscErrorCode Scale(Mat H, Vec f, Vec lo, Vec hi, Vec y, Vec d, PetscReal *size)
+static PetscErrorCode TaoScale(Mat H, Vec f, Vec lo, Vec hi, Vec y, Vec d, PetscReal *size)
 {
   PetscInt n;
   PetscScalar *v[5];
@@ -393,7 +393,7 @@ static PetscErrorCode CatchRun(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylo
   *its = 0;
   *solved = PETSC_FALSE;
   PetscCall(HycoCatchBegin());
-  caught = Run(t, lo, hi, y, krylov, its, solved);
+  caught = TaoRun(t, lo, hi, y, krylov, its, solved);
   /* After a failure its state is unknown; a Krylov solve was set up for this problem alone. */
   if (caught || !*solved || krylov) {
     const PetscErrorCode more = TaoDestroy(&t->tao);
@@ -414,7 +414,7 @@ static PetscErrorCode CatchRun(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylo
 }
 
 /* | y - median(lo, y - (H y - f), hi) |, 0 at the solution. For the choice between two results. */
-static PetscErrorCode Projected(const HycoTao t, Vec lo, Vec hi, Vec y, PetscReal *size)
+static PetscErrorCode TaoProjected(const HycoTao t, Vec lo, Vec hi, Vec y, PetscReal *size)
 {
   Vec step;
 
@@ -440,7 +440,7 @@ static PetscErrorCode SecondStart(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool kr
   PetscBool failed;
 
   PetscFunctionBegin;
-  PetscCall(Projected(t, lo, hi, y, &before));
+  PetscCall(TaoProjected(t, lo, hi, y, &before));
   /* As good as it gets, in spite of TAO's word. */
   if (before < 1e-10) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(y, &first));
@@ -450,7 +450,7 @@ static PetscErrorCode SecondStart(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool kr
   PetscCall(VecMedian(lo, y, hi, y));
   PetscCall(CatchRun(t, lo, hi, y, krylov, its, solved, &failed));
   *its += first_its;
-  PetscCall(Projected(t, lo, hi, y, &after));
+  PetscCall(TaoProjected(t, lo, hi, y, &after));
   if (!*solved && !(after < before)) PetscCall(VecCopy(first, y));
   PetscCall(VecDestroy(&first));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -468,7 +468,7 @@ PetscErrorCode HycoTaoSolve(HycoTao t, Mat H, Vec f, Vec lo, Vec hi, Vec y, Pets
   t->H = H;
   t->F = f;
   PetscCall(VecDuplicate(y, &d));
-  PetscCall(Scale(H, f, lo, hi, y, d, &size));
+  PetscCall(TaoScale(H, f, lo, hi, y, d, &size));
   failure[0] = '\0';
   PetscCall(CatchRun(t, lo, hi, y, PETSC_FALSE, its, solved, &failed));
   /* An error inside TAO, as a factor of a singular Hessian: once more without factors. */
@@ -515,7 +515,7 @@ static PetscErrorCode SolveOwn(HycoTao t, Vec hi, Vec y, PetscInt max_its)
   PetscBool made;
 
   PetscFunctionBegin;
-  PetscCall(Prepare(t, y, max_its, &made));
+  PetscCall(TaoPrepare(t, y, max_its, &made));
   if (made) PetscCall(ReadOptions(t));
   if (t->set)
     PetscCall(TaoSetVariableBounds(t->tao, NULL, hi));
@@ -548,7 +548,7 @@ PetscErrorCode HycoTaoSolveSet(HycoTao t, const HycoActiveSet *set, PetscBool ac
 
 /* Of each pair (z_i, w_i) sets the smaller to 0: interior and first-order types leave small forces at open gaps.
    Positive forces at clearly open gaps would count as active contacts. */
-static void Clean(const HycoLCP *lcp, PetscReal z[])
+static void TaoClean(const HycoLCP *lcp, PetscReal z[])
 {
   const PetscInt n = lcp->n;
   PetscReal size_z = 0, size_q = 0;
@@ -576,7 +576,7 @@ static PetscErrorCode CopyDense(HycoTao t, const HycoLCP *lcp)
   PetscFunctionBegin;
   if (t->dense) PetscCall(MatGetSize(t->dense, &n, NULL));
   if (n != lcp->n) {
-    PetscCall(Reset(t));
+    PetscCall(TaoReset(t));
     PetscCall(ResetDense(t));
     PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, lcp->n, lcp->n, NULL, &t->dense));
     PetscCall(MatCreateVecs(t->dense, &t->y, &t->f));
@@ -607,7 +607,7 @@ static PetscErrorCode PlaceSolution(HycoTao t, PetscInt n, PetscReal z[])
   if (t->placed) PetscCall(VecGetSize(t->placed, &old));
   if (old != n) {
     /* A Tao of PETSc 3.18 keeps the size of its first solution. */
-    PetscCall(Reset(t));
+    PetscCall(TaoReset(t));
     PetscCall(VecDestroy(&t->placed));
     PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, n, NULL, &t->placed));
   }
@@ -641,6 +641,6 @@ PetscErrorCode HycoTaoSolveLCP(HycoTao t, const HycoLCP *lcp, PetscBool active[]
   PetscCall(CopyDense(t, lcp));
   PetscCall(HycoTaoSolve(t, t->dense, t->f, t->lo, t->hi, t->y, its, solved));
   PetscCall(HycoVecRead(t->y, lcp->n, z));
-  Clean(lcp, z);
+  TaoClean(lcp, z);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -22,7 +22,7 @@ typedef struct {
 
 /* Fills with this rank's free unknowns: those with no bound in the set. Global numbers, as the block of H is
    selected by them. */
-static PetscErrorCode Free(const Model *m, const PetscBool active[], IS *is, PetscInt *n_free)
+static PetscErrorCode TaoNewtonFree(const Model *m, const PetscBool active[], IS *is, PetscInt *n_free)
 {
   PetscInt k = 0, *rows;
 
@@ -38,7 +38,7 @@ static PetscErrorCode Free(const Model *m, const PetscBool active[], IS *is, Pet
 }
 
 /* d = bound - x on the set, 0 elsewhere. */
-static PetscErrorCode Close(const Model *m, const PetscBool active[])
+static PetscErrorCode TaoNewtonClose(const Model *m, const PetscBool active[])
 {
   const PetscScalar *x, *lo, *hi;
   PetscScalar *d;
@@ -116,9 +116,9 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
   IS is;
 
   PetscFunctionBegin;
-  PetscCall(Close(m, active));
+  PetscCall(TaoNewtonClose(m, active));
   PetscCall(MatMultAdd(m->H, m->d, m->g, m->w));
-  PetscCall(Free(m, active, &is, &n_free));
+  PetscCall(TaoNewtonFree(m, active, &is, &n_free));
   *singular = PETSC_FALSE;
   if (n_free) PetscCall(SolveFree(m, is, singular));
   PetscCall(ISDestroy(&is));
@@ -128,7 +128,7 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
 }
 
 /* Beyond round-off: free unknowns outside a bound, and bounds in the set whose multiplier has the wrong sign. */
-static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool violates[])
+static PetscErrorCode TaoNewtonViolations(void *ctx, const PetscBool active[], PetscBool violates[])
 {
   const Model *m = (const Model *)ctx;
   const PetscScalar *p, *w, *lo, *hi;
@@ -172,7 +172,7 @@ static PetscErrorCode ProjectedGradient(const Model *m, Vec x, Vec g, PetscReal 
 }
 
 /* Passes an iterate to TAO's history and monitors. */
-static PetscErrorCode Show(const Model *m, PetscReal f, PetscReal residual, PetscReal step)
+static PetscErrorCode TaoNewtonShow(const Model *m, PetscReal f, PetscReal residual, PetscReal step)
 {
   PetscInt linear_its = 0;
 
@@ -185,7 +185,7 @@ static PetscErrorCode Show(const Model *m, PetscReal f, PetscReal residual, Pets
 
 /* One solve on a set: the model's value and projected gradient, those of a quadratic f itself. An iteration of the
    inner loop counts as one of the Tao. */
-static PetscErrorCode Monitor(PetscInt its, PetscInt n_active, PetscInt changes, void *ctx)
+static PetscErrorCode TaoNewtonMonitor(PetscInt its, PetscInt n_active, PetscInt changes, void *ctx)
 {
   const Model *m = (const Model *)ctx;
   PetscReal residual, gd, wd;
@@ -194,7 +194,7 @@ static PetscErrorCode Monitor(PetscInt its, PetscInt n_active, PetscInt changes,
   PetscFunctionBegin;
   (void)its, (void)n_active;
   m->tao->niter++;
-  /* The last set's step is measured by Move() on f itself. */
+  /* The last set's step is measured by TaoNewtonMove() on f itself. */
   if (!changes) PetscFunctionReturn(PETSC_SUCCESS); /* shown after the step */
   PetscCall(VecDuplicate(m->x, &y));
   PetscCall(VecWAXPY(y, 1, m->d, m->x));
@@ -202,7 +202,7 @@ static PetscErrorCode Monitor(PetscInt its, PetscInt n_active, PetscInt changes,
   PetscCall(VecDot(m->g, m->d, &gd));
   PetscCall(VecDot(m->w, m->d, &wd));
   PetscCall(VecDestroy(&y));
-  PetscCall(Show(m, m->f + (gd + wd) / 2, residual, 1));
+  PetscCall(TaoNewtonShow(m, m->f + (gd + wd) / 2, residual, 1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -238,8 +238,8 @@ static PetscErrorCode StepByActiveSet(Model *m, HycoLCPStatus *status)
                        .one_by_one = PETSC_TRUE,
                        .ctx = m,
                        .solve = SolveOnSet,
-                       .violations = Violations,
-                       .monitor = Monitor,
+                       .violations = TaoNewtonViolations,
+                       .monitor = TaoNewtonMonitor,
                        .monitor_ctx = m};
   PetscBool *active;
   PetscInt its;
@@ -299,7 +299,7 @@ static PetscErrorCode StepByLemke(Model *m, HycoLCPStatus *status)
 }
 
 /* f and its gradient at x. f is not needed without a line search. */
-static PetscErrorCode Evaluate(Model *m)
+static PetscErrorCode TaoNewtonEvaluate(Model *m)
 {
   PetscFunctionBegin;
   if (m->objective)
@@ -312,7 +312,7 @@ static PetscErrorCode Evaluate(Model *m)
 /* Moves x along d, within the bounds, by the first of 1, 1/2, 1/4, ... with a sufficient decrease of f beyond
    *round-off; step: that share of d, 0 if there is none; *small: it does not change x beyond round-off. x + d is
    projected first, as round-off may leave the bounds. */
-static PetscErrorCode Move(Model *m, PetscReal *step, PetscBool *small)
+static PetscErrorCode TaoNewtonMove(Model *m, PetscReal *step, PetscBool *small)
 {
   const PetscReal before = m->f;
   PetscReal slope, size_x, size_d;
@@ -336,12 +336,12 @@ static PetscErrorCode Move(Model *m, PetscReal *step, PetscBool *small)
     *step = 0;
     PetscCall(VecCopy(m->p, m->x));
   }
-  PetscCall(Evaluate(m));
+  PetscCall(TaoNewtonEvaluate(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* One Newton iteration. Stops are TAO's tests, a step at round-off, or a line search without decrease. */
-static PetscErrorCode Iterate(Model *m, PetscErrorCode (*minimise)(Model *, HycoLCPStatus *))
+static PetscErrorCode TaoNewtonIterate(Model *m, PetscErrorCode (*minimise)(Model *, HycoLCPStatus *))
 {
   Tao tao = m->tao;
   HycoLCPStatus status;
@@ -357,9 +357,9 @@ static PetscErrorCode Iterate(Model *m, PetscErrorCode (*minimise)(Model *, Hyco
     tao->reason = TAO_DIVERGED_USER;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(Move(m, &step, &small));
+  PetscCall(TaoNewtonMove(m, &step, &small));
   PetscCall(ProjectedGradient(m, m->x, m->g, &residual));
-  PetscCall(Show(m, m->f, residual, step));
+  PetscCall(TaoNewtonShow(m, m->f, residual, step));
   PetscCall((*tao->ops->convergencetest)(tao, tao->cnvP));
   if (tao->reason != TAO_CONTINUE_ITERATING) PetscFunctionReturn(PETSC_SUCCESS);
   if (small)
@@ -370,7 +370,7 @@ static PetscErrorCode Iterate(Model *m, PetscErrorCode (*minimise)(Model *, Hyco
 }
 
 /* What the Tao must have, and its default: no bounds. */
-static PetscErrorCode Read(Tao tao, PetscBool lemke, Model *m)
+static PetscErrorCode TaoNewtonRead(Tao tao, PetscBool lemke, Model *m)
 {
   PetscReal least, most;
   PetscBool with_gradient;
@@ -415,18 +415,18 @@ PetscErrorCode HycoTaoNewton(Tao tao, PetscBool lemke)
   PetscReal residual;
 
   PetscFunctionBegin;
-  PetscCall(Read(tao, lemke, &m));
+  PetscCall(TaoNewtonRead(tao, lemke, &m));
   HycoVecDuplicate(m.x, &m.d, &m.w, &m.p);
   /* The start is projected onto the bounds. */
   PetscCall(VecMedian(m.lo, m.x, m.hi, m.x));
   PetscCall(PetscObjectStateIncrease((PetscObject)m.x)); /* VecMedian() does not on ranks without rows, whose cached
                                                             norm would then remain, and only there */
-  PetscCall(Evaluate(&m));
+  PetscCall(TaoNewtonEvaluate(&m));
   PetscCall(ProjectedGradient(&m, m.x, m.g, &residual));
   tao->reason = TAO_CONTINUE_ITERATING;
-  PetscCall(Show(&m, m.f, residual, 0));
+  PetscCall(TaoNewtonShow(&m, m.f, residual, 0));
   PetscCall((*tao->ops->convergencetest)(tao, tao->cnvP));
-  while (tao->reason == TAO_CONTINUE_ITERATING) PetscCall(Iterate(&m, lemke ? StepByLemke : StepByActiveSet));
+  while (tao->reason == TAO_CONTINUE_ITERATING) PetscCall(TaoNewtonIterate(&m, lemke ? StepByLemke : StepByActiveSet));
   HycoDestroyAll(&m.d, &m.w, &m.p);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

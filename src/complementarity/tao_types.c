@@ -1,15 +1,15 @@
 /*
   hyco's complementarity methods as Tao types: HYCO_TAO_ACTIVE_SET and HYCO_TAO_LEMKE, and HYCO_TAO_SEMISMOOTH_NEWTON
-  for the blocks of contact systems. In any program the first two solve the problem of the Tao (tao_newton.c). A form of HycoSolver knows more than a Hessian says: how to solve on a set with a
-  factor, multigrid or coarser problems that it keeps. It therefore attaches a HycoTao as the type's data, whose
-  functions take the place of the general ones: they solve, and the bounds are those of the Tao here too. The problem is
-  unscaled; the monitor shows the number of active contacts as the function value and the number of changes as the
-  residual.
+  for the blocks of contact systems. In any program the first two solve the problem of the Tao (tao_newton.c). A form of
+  HycoSolver knows more than a Hessian says: how to solve on a set with a factor, multigrid or coarser problems that it
+  keeps. It therefore attaches a HycoTao as the type's data, whose functions take the place of the general ones: they
+  solve, and the bounds are those of the Tao here too. The problem is unscaled; the monitor shows the number of active
+  contacts as the function value and the number of changes as the residual.
 */
 #include <hycotao.h>
 
 /* Passes an iteration of the active set to TAO's monitors and the user's. */
-static PetscErrorCode Monitor(PetscInt its, PetscInt n_active, PetscInt changes, void *ctx)
+static PetscErrorCode TaoTypeMonitor(PetscInt its, PetscInt n_active, PetscInt changes, void *ctx)
 {
   const HycoTao t = (HycoTao)ctx;
 
@@ -30,8 +30,8 @@ static void SetReason(const HycoTao t)
                                                  : TAO_DIVERGED_USER;
 }
 
-/* Reads the bounds lo <= z of a form's dense problem from the Tao. *q: its constant term for z - lo where a bound is not
-   0, otherwise NULL. */
+/* Reads the bounds lo <= z of a form's dense problem from the Tao. *q: its constant term for z - lo where a bound is
+   not 0, otherwise NULL. */
 static PetscErrorCode ReadBounds(Tao tao, const HycoLCP *lcp, PetscReal **q)
 {
   const PetscInt n = lcp->p + lcp->n;
@@ -71,7 +71,7 @@ static PetscErrorCode SolveDense(Tao tao, PetscErrorCode (*method)(HycoTao, cons
   PetscFunctionBegin;
   if (!lcp.blocks) PetscCall(ReadBounds(tao, &lcp, &q));
   if (q) lcp.q = q;
-  lcp.monitor = t->monitor || tao->numbermonitors || tao->hist_max ? Monitor : NULL;
+  lcp.monitor = t->monitor || tao->numbermonitors || tao->hist_max ? TaoTypeMonitor : NULL;
   lcp.monitor_ctx = t;
   PetscCall(method(t, &lcp));
   SetReason(t);
@@ -108,7 +108,7 @@ static PetscErrorCode SolveActiveSet(Tao tao)
     HycoActiveSet set = *t->set;
 
     set.max_its = tao->max_it;
-    set.monitor = t->monitor || tao->numbermonitors || tao->hist_max ? Monitor : NULL;
+    set.monitor = t->monitor || tao->numbermonitors || tao->hist_max ? TaoTypeMonitor : NULL;
     set.monitor_ctx = t;
     /* The form reads the bounds where a Tao has them: a program may have set others. */
     if (set.bounds) PetscCall(set.bounds(set.ctx, tao->XL, tao->XU));
@@ -178,7 +178,8 @@ static PetscErrorCode SolveSemismooth(Tao tao)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -..tao_ksp_, whose name TAO leaves to the type: without prefix for some; tao_bnk_ksp_, tao_bqnk_ksp_ of TAO's Newton types. */
+/* -..tao_ksp_, whose name TAO leaves to the type: without prefix for some; tao_bnk_ksp_, tao_bqnk_ksp_ of TAO's Newton
+   types. */
 PetscErrorCode HycoTaoSetKSPPrefix(Tao tao)
 {
   /* Not yet there while a type is made: one of hyco's. */
@@ -213,7 +214,7 @@ static PetscErrorCode CreateKSP(Tao tao)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Create(Tao tao, PetscErrorCode (*solve)(Tao))
+static PetscErrorCode TaoTypeCreate(Tao tao, PetscErrorCode (*solve)(Tao))
 {
   PetscFunctionBegin;
   PetscCall(TaoParametersInitialize(tao));
@@ -226,7 +227,7 @@ static PetscErrorCode Create(Tao tao, PetscErrorCode (*solve)(Tao))
 static PetscErrorCode CreateActiveSet(Tao tao)
 {
   PetscFunctionBegin;
-  PetscCall(Create(tao, SolveActiveSet));
+  PetscCall(TaoTypeCreate(tao, SolveActiveSet));
   PetscCall(CreateKSP(tao));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -234,13 +235,13 @@ static PetscErrorCode CreateActiveSet(Tao tao)
 /* No KSP: pivots need none. */
 static PetscErrorCode CreateLemke(Tao tao)
 {
-  return Create(tao, SolveLemke);
+  return TaoTypeCreate(tao, SolveLemke);
 }
 
 /* Only with a HycoTao as data, which has the blocks. */
 static PetscErrorCode CreateSemismooth(Tao tao)
 {
-  return Create(tao, SolveSemismooth);
+  return TaoTypeCreate(tao, SolveSemismooth);
 }
 
 /* Once, by the package's start; a second registration replaces the first. */

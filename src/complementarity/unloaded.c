@@ -1,7 +1,7 @@
 /*
   Floating bodies on which no load acts: contact forces 0 solve w = q + M z, z = (x, forces), where a motion x leaves no
-  gap negative, q + G x >= 0 with G the columns of x in M. The nearest one to a given x is a problem of least distance, a
-  nonnegative least-squares problem in multipliers (C. L. Lawson, R. J. Hanson, Solving Least Squares Problems (1974),
+  gap negative, q + G x >= 0 with G the columns of x in M. The nearest one to a given x is a problem of least distance,
+  a nonnegative least-squares problem in multipliers (C. L. Lawson, R. J. Hanson, Solving Least Squares Problems (1974),
   chapter 23).
 */
 #include <hycoalgorithms.h>
@@ -9,7 +9,8 @@
 
 #define APART 1e-8 /* residual of that problem, whose right-hand side is 1: below, no motion opens all contacts */
 
-/* G d >= -w, |d| least: with E = (G, -w)^T and u >= 0 of least |E u - e|, e = (0, 1), d = -r / r_last for r = E u - e. */
+/* G d >= -w, |d| least: with E = (G, -w)^T and u >= 0 of least |E u - e|, e = (0, 1), d = -r / r_last for r = E u -
+   e. */
 static PetscErrorCode LeastDistance(PetscInt p, PetscInt n, const PetscReal E[], PetscReal d[], PetscBool *exists)
 {
   PetscReal *u, *e, *r, residual;
@@ -52,8 +53,8 @@ PetscErrorCode HycoLCPUnload(PetscInt N, PetscInt p, PetscInt n, const PetscInt 
     most = PetscMax(most, PetscAbsReal(w));
     least = PetscMin(least, w);
   }
-  /* In units of the largest gap and of the motion that changes one by as much: both rows of E and d are of size 1, so that
-     r_last does not cancel. */
+  /* In units of the largest gap and of the motion that changes one by as much: both rows of E and d are of size 1, so
+     that r_last does not cancel. */
   for (PetscInt k = 0; k < n && least < 0; k++) {
     for (PetscInt i = 0; i < p && unit > 0; i++) E[k * (p + 1) + i] /= unit;
     E[k * (p + 1) + p] /= most;

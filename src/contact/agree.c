@@ -29,8 +29,8 @@ static PetscErrorCode IsShared(MPI_Comm comm, HycoMesh part, HycoMesh m, const H
    of the scene has slaves, one with drawn masters has at least one master, and pairs are one to one. If not, the caller
    searches on one rank, which reports the error. Collective. Counts alone, since a rank cannot know what another one
    would have found. */
-PetscErrorCode HycoContactsAgree(MPI_Comm comm, HycoScene scene, HycoMesh part, HycoMesh surface, const HycoPairs *p,
-                                 PetscBool *agreed)
+PetscErrorCode HycoContactsSynchronise(MPI_Comm comm, HycoScene scene, HycoMesh part, HycoMesh surface,
+                                       const HycoPairs *p, PetscBool *agreed)
 {
   PetscInt *n; /* by contact of the scene: all, those with a master */
 

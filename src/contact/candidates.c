@@ -1,11 +1,11 @@
 /*
   The nodes of the masters' surfaces that the slaves of each rank may meet. A rank's slave nodes are halved by recursive
   bisection (M. Berger, S. Bokhari, IEEE Trans. Comput. C-36 (1987) 570-580) into a tree of boxes. No slave is farther
-  from its nearest point than the farthest corner of its box from any node of the master, so that facets farther away than
-  the least of these distances cannot have it. Each rank tests the facets around its own nodes against all ranks' boxes,
-  and sends the numbers of these nodes.
+  from its nearest point than the farthest corner of its box from any node of the master, so that facets farther away
+  than the least of these distances cannot have it. Each rank tests the facets around its own nodes against all ranks'
+  boxes, and sends the numbers of these nodes.
 */
-#include "facing.h"
+#include "surface_normals.h"
 #include "master_search.h"
 #include <hycovector.h>
 
@@ -40,7 +40,7 @@ static PetscBool IsEmpty(const Box *b)
 }
 
 /* The distances of a point from the nearest and from the farthest point of a box. */
-static void Distances(const Box *b, const PetscReal x[3], PetscReal *least, PetscReal *most)
+static void CandidatesDistances(const Box *b, const PetscReal x[3], PetscReal *least, PetscReal *most)
 {
   PetscReal near[3], far[3];
 
@@ -53,7 +53,7 @@ static void Distances(const Box *b, const PetscReal x[3], PetscReal *least, Pets
 }
 
 /* The tree of the points lo .. hi - 1 from box b on, halved along the longest side. */
-static void Halve(HycoPoint point[], PetscInt lo, PetscInt hi, PetscInt b, Box tree[])
+static void CandidatesHalve(HycoPoint point[], PetscInt lo, PetscInt hi, PetscInt b, Box tree[])
 {
   const PetscInt mid = (lo + hi) / 2;
   Box *box = &tree[b];
@@ -73,8 +73,8 @@ static void Halve(HycoPoint point[], PetscInt lo, PetscInt hi, PetscInt b, Box t
   if (b >= BLOCKS - 1) return;
   /* Empty halves still get their boxes: the tree is complete. */
   if (hi > lo) HycoPointsSplit(point, lo, mid, hi, axis);
-  Halve(point, lo, mid, 2 * b + 1, tree);
-  Halve(point, mid, hi, 2 * b + 2, tree);
+  CandidatesHalve(point, lo, mid, 2 * b + 1, tree);
+  CandidatesHalve(point, mid, hi, 2 * b + 2, tree);
 }
 
 /* The trees of all ranks. The boxes of this rank's own slaves, halved along their longest side, as leaves of a tree of
@@ -95,30 +95,30 @@ static PetscErrorCode FindBoxes(Candidates *s)
     point[n].index = n;
     n++;
   }
-  Halve(point, 0, n, 0, s->tree + (size_t)s->rank * BOXES);
+  CandidatesHalve(point, 0, n, 0, s->tree + (size_t)s->rank * BOXES);
   PetscCall(PetscFree(point));
   /* Every rank has all trees: 127 boxes per rank, whatever the mesh is. */
   PetscCallMPI(MPI_Allgather(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, s->tree, BOXES * sizeof(Box), MPI_BYTE, s->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lowers the reach of the leaves under a box to the distance of their farthest corners from a node of the master; that of
-   a box is the largest under it. */
-static void Lower(Box tree[], PetscInt b, const PetscReal x[3])
+/* Lowers the reach of the leaves under a box to the distance of their farthest corners from a node of the master; that
+   of a box is the largest under it. */
+static void CandidatesLower(Box tree[], PetscInt b, const PetscReal x[3])
 {
   Box *box = &tree[b];
   PetscReal least, most;
 
   if (IsEmpty(box)) return;
-  Distances(box, x, &least, &most);
+  CandidatesDistances(box, x, &least, &most);
   /* The node cannot lower any leaf in this box. */
   if (least >= box->reach) return;
   if (b >= BLOCKS - 1) {
     box->reach = PetscMin(box->reach, most);
     return;
   }
-  Lower(tree, 2 * b + 1, x);
-  Lower(tree, 2 * b + 2, x);
+  CandidatesLower(tree, 2 * b + 1, x);
+  CandidatesLower(tree, 2 * b + 2, x);
   box->reach = 0;
   for (PetscInt child = 2 * b + 1; child <= 2 * b + 2; child++) {
     if (!IsEmpty(&tree[child])) box->reach = PetscMax(box->reach, tree[child].reach);
@@ -136,7 +136,7 @@ static PetscErrorCode FindReach(Candidates *s)
   /* A sample of the master's nodes of this rank is enough: each gives a valid bound, and more only tighten it. */
   for (PetscMPIInt r = 0; r < s->size; r++) {
     for (PetscInt k = 0; k < n; k += PetscMax(n / SAMPLES, 1))
-      Lower(s->tree + (size_t)r * BOXES, 0, s->fe->X + 3 * m->group_node[first + k]);
+      CandidatesLower(s->tree + (size_t)r * BOXES, 0, s->fe->X + 3 * m->group_node[first + k]);
   }
   PetscCall(PetscMalloc1((size_t)s->size * BOXES, &reach));
   for (PetscInt b = 0; b < s->size * BOXES; b++) reach[b] = s->tree[b].reach;
@@ -158,7 +158,7 @@ static PetscErrorCode FindReach(Candidates *s)
 }
 
 /* Sends a node of this rank to a rank; twice perhaps, where its facets are not near the same ranks. */
-static PetscErrorCode Add(Candidates *s, PetscMPIInt rank, PetscInt node)
+static PetscErrorCode CandidatesAdd(Candidates *s, PetscMPIInt rank, PetscInt node)
 {
   PetscFunctionBegin;
   /* Each node is offered by its owner alone. */
@@ -181,7 +181,7 @@ static PetscBool IsNear(const Box tree[], PetscInt b, const PetscReal centre[3],
   PetscReal least, most;
 
   if (IsEmpty(&tree[b])) return PETSC_FALSE;
-  Distances(&tree[b], centre, &least, &most);
+  CandidatesDistances(&tree[b], centre, &least, &most);
   /* Farther than any nearest point under this box can be. */
   if (least - radius > tree[b].reach) return PETSC_FALSE;
   if (b >= BLOCKS - 1) return PETSC_TRUE;
@@ -189,7 +189,7 @@ static PetscBool IsNear(const Box tree[], PetscInt b, const PetscReal centre[3],
 }
 
 /* The ball around a facet's nodes. */
-static PetscReal Ball(HycoFE fe, PetscInt facet, PetscReal centre[3])
+static PetscReal CandidatesBall(HycoFE fe, PetscInt facet, PetscReal centre[3])
 {
   const PetscInt nf = fe->mesh->nf, *node = fe->mesh->facets + facet * nf;
   PetscReal radius = 0;
@@ -202,9 +202,9 @@ static PetscReal Ball(HycoFE fe, PetscInt facet, PetscReal centre[3])
   return radius;
 }
 
-/* Where rows are integrals over the facets around a slave: these have points 2 radii R away, whose middles are as far from
-   the master as the slave, plus R, and along the normal the master is farther than its nearest point is, by the limit of
-   opposed normals. */
+/* Where rows are integrals over the facets around a slave: these have points 2 radii R away, whose middles are as far
+   from the master as the slave, plus R, and along the normal the master is farther than its nearest point is, by the
+   limit of opposed normals. */
 static PetscErrorCode WidenMargin(Candidates *s)
 {
   HycoMesh m = s->fe->mesh;
@@ -212,7 +212,7 @@ static PetscErrorCode WidenMargin(Candidates *s)
 
   PetscFunctionBegin;
   for (PetscInt f = 0; f < m->n_facets; f++) {
-    if (m->facet_group[f] == s->slave) most = PetscMax(most, Ball(s->fe, f, centre));
+    if (m->facet_group[f] == s->slave) most = PetscMax(most, CandidatesBall(s->fe, f, centre));
   }
   HycoAllreduce(&most, 1, MPIU_REAL, MPI_MAX, s->comm);
   /* HYCO_OPPOSED is negative: the cosine of the largest angle at which normals face each other. */
@@ -221,8 +221,8 @@ static PetscErrorCode WidenMargin(Candidates *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How far beyond its bound a block searches: coincident points of HycoMasterSearchProject(), round-off, and `slack` times
-   the widest facet. */
+/* How far beyond its bound a block searches: coincident points of HycoMasterSearchProject(), round-off, and `slack`
+   times the widest facet. */
 static PetscErrorCode FindMargin(Candidates *s, PetscBool integrated, PetscReal slack)
 {
   HycoMesh m = s->fe->mesh;
@@ -233,7 +233,7 @@ static PetscErrorCode FindMargin(Candidates *s, PetscBool integrated, PetscReal 
     PetscReal radius;
 
     if (m->facet_group[f] != s->master) continue;
-    radius = Ball(s->fe, f, centre);
+    radius = CandidatesBall(s->fe, f, centre);
     most[0] = PetscMax(most[0], radius);
     most[1] = PetscMax(most[1], HycoLength(centre) + radius);
   }
@@ -258,20 +258,20 @@ static PetscErrorCode AddNear(Candidates *s)
     PetscReal centre[3], radius;
 
     if (m->facet_group[f] != s->master) continue;
-    radius = Ball(s->fe, f, centre);
+    radius = CandidatesBall(s->fe, f, centre);
     /* A node of the group without a facet on this rank may still be a master of node pairs. */
     for (PetscInt a = 0; a < m->nf; a++) s->on[node[a]] = PETSC_TRUE;
     for (PetscMPIInt r = 0; r < s->size; r++) {
       /* The tree of boxes around the slaves of rank r: a facet's ball that meets none of them is not sent. */
       for (PetscInt a = 0; IsNear(s->tree + (size_t)r * BOXES, 0, centre, radius) && a < m->nf; a++)
-        PetscCall(Add(s, r, node[a]));
+        PetscCall(CandidatesAdd(s, r, node[a]));
     }
   }
   for (PetscInt k = m->group_start[s->master]; k < m->group_start[s->master + 1]; k++) {
     const PetscInt i = m->group_node[k];
 
     for (PetscMPIInt r = 0; r < s->size && !s->on[i]; r++) {
-      if (IsNear(s->tree + (size_t)r * BOXES, 0, s->fe->X + 3 * i, 0)) PetscCall(Add(s, r, i));
+      if (IsNear(s->tree + (size_t)r * BOXES, 0, s->fe->X + 3 * i, 0)) PetscCall(CandidatesAdd(s, r, i));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -286,7 +286,7 @@ static PetscErrorCode AddAll(Candidates *s)
   PetscFunctionBegin;
   for (PetscInt k = m->group_start[s->master]; k < m->group_start[s->master + 1]; k++) {
     for (PetscMPIInt r = 0; r < s->size; r++) {
-      if (!IsEmpty(&s->tree[(size_t)r * BOXES])) PetscCall(Add(s, r, m->group_node[k]));
+      if (!IsEmpty(&s->tree[(size_t)r * BOXES])) PetscCall(CandidatesAdd(s, r, m->group_node[k]));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

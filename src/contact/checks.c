@@ -1,12 +1,12 @@
 /* Checks that a contact's geometry is suitable for small displacements, and measures whether they stay small. */
-#include "facing.h"
+#include "surface_normals.h"
 #include <hycovector.h>
 
 /* Share of a slave's facet: largest overlap of surfaces before any load. */
 #define HYCO_OVERLAP_SHARE 0.5
 
-/* The cosine of 84 degrees: a given normal at a larger angle to its surface's outward one is along the surface, or into the
-   body. Surfaces that face each other are within 72 degrees. */
+/* The cosine of 84 degrees: a given normal at a larger angle to its surface's outward one is along the surface, or into
+   the body. Surfaces that face each other are within 72 degrees. */
 #define ALONG 0.1
 
 /* The size of facets around a node, of one surface at a time: the slave's or the master's of a contact of the scene. */
@@ -193,8 +193,8 @@ PetscErrorCode HycoContactFacets(HycoFE fe, const HycoPairs *pairs, PetscReal fa
 }
 
 /* For an active contact, the tangential motion over the facet's size: the measure of whether displacements are small.
-   overlap: of the unloaded gaps. index: from contacts to entries of L and facet (NULL: the same). For remarks to the user:
-   a large sliding or overlap makes small displacements or pairs doubtful, but is no error. */
+   overlap: of the unloaded gaps. index: from contacts to entries of L and facet (NULL: the same). For remarks to the
+   user: a large sliding or overlap makes small displacements or pairs doubtful, but is no error. */
 PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u[], const PetscReal L[],
                                   const PetscInt index[], const PetscReal facet[], HycoContactState *state)
 {

@@ -15,8 +15,8 @@
 #define FAR_OUTSIDE 3
 
 /* The squared distance at a point of the reference facet; the vector from x and the tangents there, and the weights. */
-static PetscReal Evaluate(const HycoCurved *f, const PetscReal x[3], const PetscReal at[2], PetscReal r[3],
-                          PetscReal tangent[2][3], PetscReal w[])
+static PetscReal CurvedFacetEvaluate(const HycoCurved *f, const PetscReal x[3], const PetscReal at[2], PetscReal r[3],
+                                     PetscReal tangent[2][3], PetscReal w[])
 {
   PetscReal slope[HYCO_FACET_NODES][3];
 
@@ -34,7 +34,7 @@ static PetscReal Evaluate(const HycoCurved *f, const PetscReal x[3], const Petsc
 }
 
 /* The Gauss-Newton step, at most 1 long; its length, 0 where the facet is degenerate. */
-static PetscReal Step(const HycoCurved *f, const PetscReal r[3], PetscReal tangent[2][3], PetscReal step[2])
+static PetscReal GaussNewtonStep(const HycoCurved *f, const PetscReal r[3], PetscReal tangent[2][3], PetscReal step[2])
 {
   const PetscReal a = HycoDot(tangent[0], tangent[0]), b = HycoDot(tangent[0], tangent[1]),
                   d = HycoDot(tangent[1], tangent[1]), g0 = HycoDot(tangent[0], r), g1 = HycoDot(tangent[1], r);
@@ -53,19 +53,19 @@ static PetscReal Step(const HycoCurved *f, const PetscReal r[3], PetscReal tange
 }
 
 /* Minimises the squared distance from `at`, on a line between its ends, and returns it. */
-static PetscReal Descend(const HycoCurved *f, const PetscReal x[3], PetscReal at[2], PetscReal w[])
+static PetscReal CurvedFacetDescend(const HycoCurved *f, const PetscReal x[3], PetscReal at[2], PetscReal w[])
 {
-  PetscReal r[3], tangent[2][3], best = Evaluate(f, x, at, r, tangent, w);
+  PetscReal r[3], tangent[2][3], best = CurvedFacetEvaluate(f, x, at, r, tangent, w);
 
   for (PetscInt it = 0; it < 100 && PetscMax(PetscAbsReal(at[0]), PetscAbsReal(at[1])) < FAR_OUTSIDE; it++) {
-    PetscReal step[2], length = Step(f, r, tangent, step), trial[2], next = PETSC_MAX_REAL;
+    PetscReal step[2], length = GaussNewtonStep(f, r, tangent, step), trial[2], next = PETSC_MAX_REAL;
 
     /* Halves the step until the distance does not grow; equality within round-off is accepted, so that the last
        steps converge. */
     for (; length > SMALL_STEP; length /= 2) {
       for (PetscInt k = 0; k < 2; k++) trial[k] = at[k] + step[k];
       if (f->corners == 2) trial[0] = PetscMin(PetscMax(trial[0], -1), 1);
-      next = Evaluate(f, x, trial, r, tangent, w);
+      next = CurvedFacetEvaluate(f, x, trial, r, tangent, w);
       if (next <= EQUAL * best) break;
       for (PetscInt k = 0; k < 2; k++) step[k] /= 2;
     }
@@ -73,7 +73,7 @@ static PetscReal Descend(const HycoCurved *f, const PetscReal x[3], PetscReal at
     best = next;
     for (PetscInt k = 0; k < 2; k++) at[k] = trial[k];
   }
-  return Evaluate(f, x, at, r, tangent, w);
+  return CurvedFacetEvaluate(f, x, at, r, tangent, w);
 }
 
 /* Without a tolerance: a minimum on a side is found by the search along the sides, with exact zeros as weights. */
@@ -97,7 +97,7 @@ static PetscReal OnLine(const HycoCurved *line, const PetscReal x[3], PetscReal 
     best = d;
     at[0] = place[a];
   }
-  return Descend(line, x, at, w);
+  return CurvedFacetDescend(line, x, at, w);
 }
 
 /* Squared distance of x from a second-order facet, with the weights of its nodes at the nearest point. Sides are
@@ -107,7 +107,7 @@ PetscReal HycoCurvedProject(const HycoCurved *f, const PetscReal x[3], PetscReal
   PetscReal at[2] = {f->corners == 3 ? 1.0 / 3 : 0, f->corners == 3 ? 1.0 / 3 : 0}, best;
 
   if (f->corners == 2) return OnLine(f, x, w);
-  best = Descend(f, x, at, w);
+  best = CurvedFacetDescend(f, x, at, w);
   /* The minimum of the extended facet is no point of it. */
   if (!IsInside(f, at)) best = PETSC_MAX_REAL;
   for (PetscInt k = 0; k < f->corners; k++) {

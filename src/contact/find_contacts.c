@@ -2,7 +2,7 @@
   Potential contacts: each of the scene's contacts adds its slave nodes with their masters, on the mesh as drawn; on
   surfaces that a map moves, masters are searched again whenever the nodes have moved.
 */
-#include "facing.h"
+#include "surface_normals.h"
 #include "master_search.h"
 #include <hycokinematics.h>
 

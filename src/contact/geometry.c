@@ -1,5 +1,5 @@
 /* Normals and gaps of the potential contacts at the current parameters. */
-#include "facing.h"
+#include "surface_normals.h"
 #include <hycokinematics.h>
 #include <hycovector.h>
 
@@ -58,8 +58,8 @@ static void MasterPoint(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal
 }
 
 /* Unit normals of the contacts first .. last - 1, all of c, at their master points; vector: room for 3 reals a node. */
-static PetscErrorCode Normals(HycoFE fe, HycoContact c, const HycoPairs *pairs, PetscInt first, PetscInt last,
-                              const HycoContactPoints *points, PetscReal vector[], PetscReal normal[])
+static PetscErrorCode GeometryNormals(HycoFE fe, HycoContact c, const HycoPairs *pairs, PetscInt first, PetscInt last,
+                                      const HycoContactPoints *points, PetscReal vector[], PetscReal normal[])
 {
   PetscInt g = 0;
 
@@ -100,8 +100,8 @@ PetscReal HycoContactNoGap(HycoFE fe)
 }
 
 /* Their gaps for these normals; the gap of a contact that faces no master is a placeholder. */
-static PetscErrorCode Gaps(HycoFE fe, HycoContact c, const HycoPairs *pairs, PetscInt first,
-                           const HycoContactPoints *points, const PetscReal normal[], PetscReal gap[])
+static PetscErrorCode GeometryGaps(HycoFE fe, HycoContact c, const HycoPairs *pairs, PetscInt first,
+                                   const HycoContactPoints *points, const PetscReal normal[], PetscReal gap[])
 {
   const PetscReal zero = HycoContactTouches(fe);
 
@@ -127,7 +127,8 @@ static PetscErrorCode Gaps(HycoFE fe, HycoContact c, const HycoPairs *pairs, Pet
 }
 
 /* work: room for 3 reals a node of the mesh and 6 a contact. */
-static PetscErrorCode Geometry(HycoFE fe, const HycoPairs *pairs, PetscReal work[], PetscReal normal[], PetscReal gap[])
+static PetscErrorCode GeometryCompute(HycoFE fe, const HycoPairs *pairs, PetscReal work[], PetscReal normal[],
+                                      PetscReal gap[])
 {
   PetscReal *slave = work + 3 * fe->mesh->n_nodes, *master = slave + 3 * pairs->n;
 
@@ -143,10 +144,10 @@ static PetscErrorCode Geometry(HycoFE fe, const HycoPairs *pairs, PetscReal work
 
     next = HycoPairsRun(pairs, k);
     points.n = next - k;
-    PetscCall(Normals(fe, c, pairs, k, next, &points, work, normal + 3 * k));
+    PetscCall(GeometryNormals(fe, c, pairs, k, next, &points, work, normal + 3 * k));
     /* In the axes of oblique supports, where the rows of B live. */
     for (PetscInt i = k; i < next && fe->n_turned; i++) HycoTurnNormal(fe, pairs, i, normal + 3 * i);
-    PetscCall(Gaps(fe, c, pairs, k, &points, normal + 3 * k, gap + k));
+    PetscCall(GeometryGaps(fe, c, pairs, k, &points, normal + 3 * k, gap + k));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -181,7 +182,7 @@ PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal
   }
   PetscCall(HycoPairsMove(fe, pairs));
   PetscCall(PetscMalloc1(3 * fe->mesh->n_nodes + 6 * pairs->n, &work));
-  HycoFinally(Geometry(fe, pairs, work, normal, gap), PetscCall(PetscFree(work)));
+  HycoFinally(GeometryCompute(fe, pairs, work, normal, gap), PetscCall(PetscFree(work)));
   /* After both are known: an overlap or a normal to the wrong side is an error of the scene. */
   PetscCall(HycoContactCheck(fe, pairs, normal, gap));
   PetscCall(KeepGeometry(fe, pairs, normal, gap));

@@ -1,13 +1,14 @@
 /*
-  Which facets around a slave count, on a surface that goes round an edge and that no map moves: those of which a part looks
-  at the master, whatever its distance. Beyond the master's border, or on another side of the body, a facet faces nothing,
-  and its area and normal are no part of a contact's.
+  Which facets around a slave count, on a surface that goes round an edge and that no map moves: those of which a part
+  looks at the master, whatever its distance. Beyond the master's border, or on another side of the body, a facet faces
+  nothing, and its area and normal are no part of a contact's.
 */
-#include "facing.h"
+#include "surface_normals.h"
 #include "master_search.h"
 #include <hycokinematics.h>
 
-/* How near to a facet's nodes it is tested, as a share of their distance from its middle; a distance that is round-off. */
+/* How near to a facet's nodes it is tested, as a share of their distance from its middle; a distance that is
+   round-off. */
 #define NEAR  0.9
 #define SMALL 1e-3
 
@@ -18,8 +19,8 @@ typedef struct {
   PetscInt first;
 } Masks;
 
-/* Whether a point at x looks at the master: the search has it as one more slave. small: of the facet's size, below which a
-   distance has no direction. */
+/* Whether a point at x looks at the master: the search has it as one more slave. small: of the facet's size, below
+   which a distance has no direction. */
 static PetscErrorCode PointLooks(HycoMasterSearch *t, PetscReal small, const PetscReal out[3], PetscBool *looks)
 {
   const PetscInt slave = t->n_nodes + t->n_slots;
@@ -37,7 +38,8 @@ static PetscErrorCode PointLooks(HycoMasterSearch *t, PetscReal small, const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether any part of facet f does: its middle, or a point near one of its nodes. x, out: of the slave that is placed there. */
+/* Whether any part of facet f does: its middle, or a point near one of its nodes. x, out: of the slave that is placed
+   there. */
 static PetscErrorCode FacetLooks(HycoMasterSearch *t, PetscInt f, PetscReal x[3], PetscReal out[3], PetscBool *looks)
 {
   HycoMesh m = t->fe->mesh;
@@ -108,7 +110,7 @@ static PetscErrorCode NoteFacets(HycoMasterSearch *t, Masks *s)
 }
 
 /* The tree and the border are there before the copy of the search is made: they belong to it. */
-static PetscErrorCode Run(HycoMasterSearch *t, PetscInt last, Masks *s)
+static PetscErrorCode MasksRun(HycoMasterSearch *t, PetscInt last, Masks *s)
 {
   PetscFunctionBegin;
   if (!t->n) PetscFunctionReturn(PETSC_SUCCESS);
@@ -146,7 +148,7 @@ PetscErrorCode HycoPairsMask(HycoFE fe, PetscInt index, PetscInt first, HycoPair
     s.next[k] = s.head[p->slave[first + k]];
     s.head[p->slave[first + k]] = k;
   }
-  HycoFinally(Run(&t, p->n, &s), HycoFreeAll(&s.head, &s.next, &s.mask, &s.left);
+  HycoFinally(MasksRun(&t, p->n, &s), HycoFreeAll(&s.head, &s.next, &s.mask, &s.left);
               PetscCall(HycoMasterSearchDestroy(&t)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

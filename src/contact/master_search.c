@@ -1,6 +1,6 @@
 /* The surfaces of one contact on the current nodes: the master's patches in a tree, normals of both surfaces, the
    master's border. */
-#include "facing.h"
+#include "surface_normals.h"
 #include "master_search.h"
 #include <stdlib.h>
 
@@ -234,7 +234,7 @@ PetscBool HycoMasterSearchOnBorder(const HycoMasterSearch *t, const HycoProjecti
 
 /* Compares the tangential part of the vector from the node to its master point, in the facet's plane, with the
    tolerance. A projection onto the border's edge is past it if the node lies beyond, along the surface. */
-PetscBool HycoMasterSearchIsBeside(const HycoMasterSearch *t, PetscInt slave, const HycoProjection *at)
+PetscBool HycoMasterSearchIsOutside(const HycoMasterSearch *t, PetscInt slave, const HycoProjection *at)
 {
   PetscReal r[3];
 
@@ -286,7 +286,7 @@ PetscErrorCode HycoMasterSearchAtBorder(HycoMasterSearch *t, const HycoProjectio
 PetscErrorCode HycoMasterSearchIsPast(HycoMasterSearch *t, PetscInt slave, const HycoProjection *at, PetscBool *past)
 {
   PetscFunctionBegin;
-  *past = HycoMasterSearchIsBeside(t, slave, at);
+  *past = HycoMasterSearchIsOutside(t, slave, at);
   if (*past) PetscCall(HycoMasterSearchAtBorder(t, at, past));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

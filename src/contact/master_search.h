@@ -62,9 +62,9 @@ PetscErrorCode HycoMasterSearchAtBorder(HycoMasterSearch *search, const HycoProj
 /* The same, once the border is there (HycoMasterSearchBorder()). */
 PetscBool HycoMasterSearchOnBorder(const HycoMasterSearch *search, const HycoProjection *at);
 PetscErrorCode HycoMasterSearchBorder(HycoMasterSearch *search);
-/* Whether a slave node is beside its facet by more than a tenth of the facet's shortest edge in its plane: past the border,
-   if the point is on it. */
-PetscBool HycoMasterSearchIsBeside(const HycoMasterSearch *search, PetscInt slave, const HycoProjection *at);
+/* Whether a slave node is beside its facet by more than a tenth of the facet's shortest edge in its plane: past the
+   border, if the point is on it. */
+PetscBool HycoMasterSearchIsOutside(const HycoMasterSearch *search, PetscInt slave, const HycoProjection *at);
 /* Whether a slave node is past the master's border, by more than a tenth of the facet's shortest edge in its plane. */
 PetscErrorCode HycoMasterSearchIsPast(HycoMasterSearch *search, PetscInt slave, const HycoProjection *at,
                                       PetscBool *past);
@@ -94,8 +94,8 @@ typedef struct {
 /* The masters of n slave nodes. */
 PetscErrorCode HycoMasterSearchFind(HycoMasterSearch *search, const HycoQuery *query, PetscInt n,
                                     const PetscInt slave[], HycoProjection at[], HycoVerdict why[]);
-/* The same of one contact, the best over the sides of the node that it stands for; whether a result is better than another:
-   it has a master, and a nearer one, or looks at one that is too far. */
+/* The same of one contact, the best over the sides of the node that it stands for; whether a result is better than
+   another: it has a master, and a nearer one, or looks at one that is too far. */
 PetscErrorCode HycoMasterSearchNearest(HycoMasterSearch *search, const HycoQuery *query, PetscInt node, PetscInt side,
                                        HycoProjection *at, HycoVerdict *why);
 PetscBool HycoVerdictIsBetter(const HycoProjection *at, HycoVerdict why, const HycoProjection *best, HycoVerdict other);

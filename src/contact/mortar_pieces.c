@@ -80,13 +80,13 @@ void HycoSideSet(const HycoPlane *plane, PetscInt nf, PetscInt corners, const Pe
 /* -- functions -- */
 
 /* Twice the signed area of the triangle a b p: > 0 where p is to the left of ab. */
-static PetscReal Cross(const PetscReal a[2], const PetscReal b[2], const PetscReal p[2])
+static PetscReal MortarPieceCross(const PetscReal a[2], const PetscReal b[2], const PetscReal p[2])
 {
   return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
 }
 
 /* The bilinear functions of the corners. */
-static void Bilinear(const PetscReal xi[2], PetscReal N[4])
+static void MortarPieceBilinear(const PetscReal xi[2], PetscReal N[4])
 {
   N[0] = (1 - xi[0]) * (1 - xi[1]) / 4;
   N[1] = (1 + xi[0]) * (1 - xi[1]) / 4;
@@ -101,7 +101,7 @@ static void InQuadrilateral(const HycoSide *s, const PetscReal p[2], PetscReal x
   for (PetscInt it = 0; it < MOST_STEPS; it++) {
     PetscReal N[4], r[2], t[2][2], det, step[2];
 
-    Bilinear(xi, N);
+    MortarPieceBilinear(xi, N);
     for (PetscInt c = 0; c < 2; c++) {
       const PetscReal x[4] = {s->at[0][c], s->at[1][c], s->at[2][c], s->at[3][c]};
 
@@ -133,14 +133,14 @@ void HycoSideFunctions(const HycoSide *s, const PetscReal p[2], PetscReal N[HYCO
     N[0] = (1 - xi[0]) / 2;
     N[1] = (1 + xi[0]) / 2;
   } else if (s->corners == 3) {
-    const PetscReal area = Cross(s->at[0], s->at[1], s->at[2]);
+    const PetscReal area = MortarPieceCross(s->at[0], s->at[1], s->at[2]);
 
-    N[1] = xi[0] = Cross(s->at[2], s->at[0], p) / area;
-    N[2] = xi[1] = Cross(s->at[0], s->at[1], p) / area;
+    N[1] = xi[0] = MortarPieceCross(s->at[2], s->at[0], p) / area;
+    N[2] = xi[1] = MortarPieceCross(s->at[0], s->at[1], p) / area;
     N[0] = 1 - N[1] - N[2];
   } else {
     InQuadrilateral(s, p, xi);
-    Bilinear(xi, N);
+    MortarPieceBilinear(xi, N);
   }
   /* Second order: the functions of all nodes at this reference point. */
   if (s->nf > s->corners) HycoFacetFunctions(s->nf, xi, N, slope);
@@ -149,23 +149,23 @@ void HycoSideFunctions(const HycoSide *s, const PetscReal p[2], PetscReal N[HYCO
 /* -- cuts -- */
 
 /* Of a convex polygon, as a fan of triangles; negative if its corners turn clockwise. */
-static PetscReal Area(PetscInt n, PetscReal at[][2])
+static PetscReal MortarPieceArea(PetscInt n, PetscReal at[][2])
 {
   PetscReal area = 0;
 
-  for (PetscInt k = 1; k + 1 < n; k++) area += Cross(at[0], at[k], at[k + 1]) / 2;
+  for (PetscInt k = 1; k + 1 < n; k++) area += MortarPieceCross(at[0], at[k], at[k + 1]) / 2;
   return area;
 }
 
 /* What is left of the edge from a to b, counterclockwise, of a convex polygon of n corners. */
-static PetscInt Keep(const PetscReal a[2], const PetscReal b[2], PetscInt n, PetscReal at[8][2])
+static PetscInt MortarPieceKeep(const PetscReal a[2], const PetscReal b[2], PetscInt n, PetscReal at[8][2])
 {
   PetscReal old[8][2];
   PetscInt kept = 0;
 
   PetscCallAbort(PETSC_COMM_SELF, PetscArraycpy(&old[0][0], &at[0][0], 2 * n));
   for (PetscInt k = 0; k < n; k++) {
-    const PetscReal *p = old[k], *q = old[(k + 1) % n], dp = Cross(a, b, p), dq = Cross(a, b, q);
+    const PetscReal *p = old[k], *q = old[(k + 1) % n], dp = MortarPieceCross(a, b, p), dq = MortarPieceCross(a, b, q);
 
     /* On the left of a counterclockwise edge is inside. */
     if (dp >= 0 && kept < 8) {
@@ -205,7 +205,7 @@ void HycoPieceCut(PetscInt dim, const HycoSide *slave, const HycoSide *master, H
   for (PetscInt a = 0; a < slave->corners; a++) {
     for (PetscInt c = 0; c < 2; c++) at[a][c] = slave->at[a][c];
   }
-  sign = Area(slave->corners, at);
+  sign = MortarPieceArea(slave->corners, at);
   for (PetscInt a = 0; a < n; a++) {
     for (PetscInt c = 0; c < 2; c++) piece->at[a][c] = master->at[a][c];
   }
@@ -213,8 +213,8 @@ void HycoPieceCut(PetscInt dim, const HycoSide *slave, const HycoSide *master, H
     const PetscInt b = (a + 1) % slave->corners;
 
     /* A slave facet may be numbered clockwise in the plane's axes. */
-    n = sign > 0 ? Keep(at[a], at[b], n, piece->at) : Keep(at[b], at[a], n, piece->at);
+    n = sign > 0 ? MortarPieceKeep(at[a], at[b], n, piece->at) : MortarPieceKeep(at[b], at[a], n, piece->at);
   }
   piece->n = n;
-  if (n > 2) piece->size = PetscAbsReal(Area(n, piece->at));
+  if (n > 2) piece->size = PetscAbsReal(MortarPieceArea(n, piece->at));
 }

@@ -1,13 +1,13 @@
 /*
   The rows of a mortar contact. On the part of a slave's facet that faces the master, the dual functions psi_i are
   biorthogonal to the nodes' functions N_k: the integral of psi_i N_k is D_i if k = i, else 0, where D_i is the integral
-  of N_i (A. Popp, M. Gitterle, M. Gee, W. Wall, Int. J. Numer. Meth. Engng 83 (2010) 1428-1465). The weighted gap of node
-  i over D_i is then n_i . (sum of w_ij x_j - x_i), with w_ij the integral of psi_i N_j over D_i: a row as of other types,
-  with more masters, the sum of whose weights is 1. The functions of each facet add up to 1, so that a uniform pressure
-  acts as its consistent nodal forces on both sides, at borders of the master too.
+  of N_i (A. Popp, M. Gitterle, M. Gee, W. Wall, Int. J. Numer. Meth. Engng 83 (2010) 1428-1465). The weighted gap of
+  node i over D_i is then n_i . (sum of w_ij x_j - x_i), with w_ij the integral of psi_i N_j over D_i: a row as of other
+  types, with more masters, the sum of whose weights is 1. The functions of each facet add up to 1, so that a uniform
+  pressure acts as its consistent nodal forces on both sides, at borders of the master too.
 */
 #include "mortar.h"
-#include "facing.h"
+#include "surface_normals.h"
 #include <hycocarriers.h>
 #include <hycokinematics.h>
 #include <petscblaslapack.h>
@@ -133,7 +133,7 @@ static void AddSimplex(Mortar *s, const HycoPlane *plane, const HycoSide *slave,
 }
 
 /* The distance of the two sides along the normal at the middle of a piece; below 0 they overlap. */
-static PetscReal Height(const HycoSide *slave, const HycoSide *master, const HycoPiece *piece)
+static PetscReal MortarRowHeight(const HycoSide *slave, const HycoSide *master, const HycoPiece *piece)
 {
   PetscReal at[2] = {0, 0}, N[HYCO_FACET_NODES], height = 0;
   HycoSide flat;
@@ -165,7 +165,7 @@ static PetscErrorCode AddPiece(Mortar *s, const HycoPlane *plane, const HycoSide
   HycoPieceCut(plane->dim, slave, &master, &piece);
   /* The nearer of two layers is kept by the limit on the height, and slivers of round-off would only add masters. */
   if (!(piece.size > ROUND_OFF * s->size)) PetscFunctionReturn(PETSC_SUCCESS);
-  height = Height(slave, &master, &piece);
+  height = MortarRowHeight(slave, &master, &piece);
   if (PetscAbsReal(height) > limit || (s->front && height < -HYCO_SAME_POINT * plane->radius))
     PetscFunctionReturn(PETSC_SUCCESS);
   HycoGrow(s->n_blocks, s->room_blocks, s->block);
@@ -212,8 +212,8 @@ static PetscReal SizeOf(PetscInt dim, const HycoSide *side)
   return whole.size;
 }
 
-/* The nearest point of the master to the facet's centre. Where surfaces go round edges, and it is on a facet that does not
-   oppose, the nearest one that does, in front: the wall of a corner, beside its floor. */
+/* The nearest point of the master to the facet's centre. Where surfaces go round edges, and it is on a facet that does
+   not oppose, the nearest one that does, in front: the wall of a corner, beside its floor. */
 static void FindNearest(Mortar *s, HycoProjection *at)
 {
   const HycoPlane *plane = &s->plane;
@@ -315,14 +315,15 @@ static PetscErrorCode AddMean(Mortar *s, PetscInt i, PetscInt row, PetscReal val
 }
 
 /* Whether a facet's node a has a function of positive integral, by which forces act on it. */
-static PetscBool Carries(const Mortar *s, PetscInt a, PetscInt node)
+static PetscBool MortarRowCarriesForce(const Mortar *s, PetscInt a, PetscInt node)
 {
   return (PetscBool)(a >= HycoMeshFirstCarrier(s->fe->mesh) && !HycoNodeHasNoArea(s->fe, node));
 }
 
 /* Node i of the facet follows its own point v_i instead of its dual mean p_i. So that the forces on both sides stay in
    balance, other nodes k of the facet take its function: psi_k + c_k psi_i, with sum of c_k = 1, and row k gets
-   c_k D_i (p_i - v_i). c: in proportion to D_k; for second order extrapolated linearly, if the nodes k determine that. */
+   c_k D_i (p_i - v_i). c: in proportion to D_k; for second order extrapolated linearly, if the nodes k determine
+   that. */
 static PetscErrorCode AddPinned(Mortar *s, const HycoSide *slave, PetscInt i, const PetscReal c[])
 {
   const HycoProjection *at = &s->pin[slave->node[i]];
@@ -341,9 +342,10 @@ static PetscErrorCode AddPinned(Mortar *s, const HycoSide *slave, PetscInt i, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The shares c of node i for second order: of least squares among those with sum c_k = 1 and sum c_k (x_k - x_i) = 0; false
-   if the nodes do not determine them. */
-static PetscBool Extrapolate(const Mortar *s, const HycoSide *slave, PetscInt i, const PetscBool takes[], PetscReal c[])
+/* The shares c of node i for second order: of least squares among those with sum c_k = 1 and sum c_k (x_k - x_i) = 0;
+   false if the nodes do not determine them. */
+static PetscBool MortarRowExtrapolate(const Mortar *s, const HycoSide *slave, PetscInt i, const PetscBool takes[],
+                                      PetscReal c[])
 {
   const PetscInt size = s->plane.dim;
   PetscReal d[HYCO_FACET_NODES][3];
@@ -380,14 +382,14 @@ static PetscErrorCode AddPins(Mortar *s, const HycoSide *slave)
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < slave->nf; k++) {
-    takes[k] = (PetscBool)(s->row[slave->node[k]] >= 0 && Carries(s, k, slave->node[k]));
+    takes[k] = (PetscBool)(s->row[slave->node[k]] >= 0 && MortarRowCarriesForce(s, k, slave->node[k]));
     if (takes[k]) sum += s->own[k];
   }
   for (PetscInt i = 0; i < slave->nf; i++) {
     /* A node with a row has its own mean, and keeps its forces. */
     if (!s->pin[slave->node[i]].n || s->row[slave->node[i]] >= 0) continue;
     c[slave->nf] = !(sum > 0);
-    if (slave->nf == slave->corners || !Extrapolate(s, slave, i, takes, c)) {
+    if (slave->nf == slave->corners || !MortarRowExtrapolate(s, slave, i, takes, c)) {
       for (PetscInt k = 0; k < slave->nf; k++) c[k] = takes[k] && sum > 0 ? s->own[k] / sum : 0;
     }
     PetscCall(AddPinned(s, slave, i, c));
@@ -419,7 +421,7 @@ static PetscErrorCode AddFacet(Mortar *s, PetscInt f)
   if (s->n_blocks) PetscCall(MakeDual(s, &slave, &usable));
   for (PetscInt i = 0; usable && i < slave.nf; i++) {
     const PetscInt row = RowOf(s, f, i);
-    const PetscReal share = Carries(s, i, slave.node[i]) ? s->own[i] : s->size;
+    const PetscReal share = MortarRowCarriesForce(s, i, slave.node[i]) ? s->own[i] : s->size;
 
     if (row < 0) continue;
     s->D[row] += share;
@@ -433,8 +435,8 @@ static PetscErrorCode AddFacet(Mortar *s, PetscInt f)
 /* -- rows -- */
 
 /* The masters of one row, whose terms are term[0 .. n) of place[]: merged, ascending, with sum 1; 0: none. */
-static PetscErrorCode Merge(const Mortar *s, PetscInt n, PetscInt place[], PetscReal D, PetscInt node[],
-                            PetscReal weight[], PetscInt *n_masters)
+static PetscErrorCode MortarRowMerge(const Mortar *s, PetscInt n, PetscInt place[], PetscReal D, PetscInt node[],
+                                     PetscReal weight[], PetscInt *n_masters)
 {
   PetscReal sum = 0;
   PetscInt kept = 0, merged = 0;
@@ -466,8 +468,8 @@ static PetscErrorCode Merge(const Mortar *s, PetscInt n, PetscInt place[], Petsc
 }
 
 /* Appends all rows: the terms are counted by row first. */
-static PetscErrorCode Append(const Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[], const PetscInt side[],
-                             HycoPairs *pairs)
+static PetscErrorCode MortarRowAppend(const Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[],
+                                      const PetscInt side[], HycoPairs *pairs)
 {
   PetscInt *start, *place, *node;
   PetscReal *weight;
@@ -486,7 +488,7 @@ static PetscErrorCode Append(const Mortar *s, PetscInt index, PetscInt n, const 
     PetscInt masters;
 
     /* Terms of one master from several facets become one, divided by D of the row. */
-    PetscCall(Merge(s, start[k + 1] - start[k], place + start[k], s->D[k], node, weight, &masters));
+    PetscCall(MortarRowMerge(s, start[k + 1] - start[k], place + start[k], s->D[k], node, weight, &masters));
     HycoPairsAppend(pairs, index, slave[k], side ? side[k] : HYCO_ONE_SIDE, masters, node, weight);
   }
   PetscCall(PetscFree3(place, node, weight));
@@ -510,7 +512,7 @@ static PetscErrorCode FindTakers(Mortar *s)
     /* Two passes over the facets: nodes far from any row take that of a neighbour which took one. */
     if (m->facet_group[f] != s->t.slave) continue;
     for (PetscInt a = 0; a < m->nf; a++) {
-      const PetscInt own = Carries(s, a, node[a]) ? s->row[node[a]] : -1;
+      const PetscInt own = MortarRowCarriesForce(s, a, node[a]) ? s->row[node[a]] : -1;
 
       if (row < 0) row = own >= 0 || k < m->n_facets ? own : s->taker[node[a]];
     }
@@ -523,8 +525,8 @@ static PetscErrorCode FindTakers(Mortar *s)
 
 /* In the order of the mesh's facets. A facet without rows of this rank is skipped, except in ties, whose pinned
    nodes give to rows of other facets. */
-static PetscErrorCode Integrate(Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[], const PetscInt side[],
-                                HycoPairs *pairs)
+static PetscErrorCode MortarRowIntegrate(Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[],
+                                         const PetscInt side[], HycoPairs *pairs)
 {
   HycoMesh m = s->fe->mesh;
 
@@ -537,16 +539,16 @@ static PetscErrorCode Integrate(Mortar *s, PetscInt index, PetscInt n, const Pet
     for (PetscInt a = 0; a < m->nf; a++) any = (PetscBool)(any || RowOf(s, f, a) >= 0);
     if (any) PetscCall(AddFacet(s, f));
   }
-  PetscCall(Append(s, index, n, slave, side, pairs));
+  PetscCall(MortarRowAppend(s, index, n, slave, side, pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The slave's and the master's groups are those of t. `s` is destroyed after an error as well. */
-static PetscErrorCode Run(Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[], const PetscInt side[],
-                          HycoPairs *pairs)
+static PetscErrorCode MortarRowRun(Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[], const PetscInt side[],
+                                   HycoPairs *pairs)
 {
   PetscFunctionBegin;
-  HycoFinally(Integrate(s, index, n, slave, side, pairs), PetscCall(MortarDestroy(s)));
+  HycoFinally(MortarRowIntegrate(s, index, n, slave, side, pairs), PetscCall(MortarDestroy(s)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -564,10 +566,10 @@ PetscErrorCode HycoMortarRows(HycoContact c, HycoFE fe, const HycoPairs *of, Pet
   PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &slaves));
   PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->master, &masters));
   PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_TRUE));
-  /* Also after an error Run() has freed what was made. */
+  /* Also after an error MortarRowRun() has freed what was made. */
   ierr = MortarCreate(fe, slaves, masters, reach, n, slave, side, &s);
   if (!ierr) ierr = HycoPairsEdges(fe, of, of->contact[first], &s.edges);
-  if (!ierr) ierr = Run(&s, of->contact[first], n, slave, side, pairs);
+  if (!ierr) ierr = MortarRowRun(&s, of->contact[first], n, slave, side, pairs);
   PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_FALSE));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -584,6 +586,6 @@ PetscErrorCode HycoMortarTie(HycoFE fe, PetscInt slaves, PetscInt masters, const
   PetscCall(MortarCreate(fe, slaves, masters, PETSC_MAX_REAL, n, slave, NULL, &s));
   s.pin = pin;
   PetscCall(FindTakers(&s));
-  PetscCall(Run(&s, 0, n, slave, NULL, pairs));
+  PetscCall(MortarRowRun(&s, 0, n, slave, NULL, pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

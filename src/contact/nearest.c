@@ -14,17 +14,17 @@
 
 /* Whether p comes before q along an axis. Equal coordinates are ordered by index: the tree is the same on any number
    of ranks. */
-static PetscBool Before(const HycoPoint *p, const HycoPoint *q, PetscInt axis)
+static PetscBool NearestPrecedes(const HycoPoint *p, const HycoPoint *q, PetscInt axis)
 {
   return (PetscBool)(p->x[axis] < q->x[axis] || (p->x[axis] == q->x[axis] && p->index < q->index));
 }
 
 /* The median of the first, the middle and the last point: with it, sorted points are halved. */
-static HycoPoint Pivot(const HycoPoint *first, const HycoPoint *middle, const HycoPoint *last, PetscInt axis)
+static HycoPoint NearestPivot(const HycoPoint *first, const HycoPoint *middle, const HycoPoint *last, PetscInt axis)
 {
-  const HycoPoint *lo = Before(first, last, axis) ? first : last, *hi = lo == first ? last : first;
+  const HycoPoint *lo = NearestPrecedes(first, last, axis) ? first : last, *hi = lo == first ? last : first;
 
-  return Before(middle, lo, axis) ? *lo : Before(middle, hi, axis) ? *middle : *hi;
+  return NearestPrecedes(middle, lo, axis) ? *lo : NearestPrecedes(middle, hi, axis) ? *middle : *hi;
 }
 
 /* Reorders point[lo .. hi) such that those before mid are the smallest along the axis: selection without a complete
@@ -33,12 +33,12 @@ void HycoPointsSplit(HycoPoint point[], PetscInt lo, PetscInt mid, PetscInt hi, 
 {
   while (hi - lo > 1 && lo < mid && mid < hi) { /* Hoare's selection */
     /* The median of three: sorted input, as nodes of a structured mesh, must not be the worst case. */
-    const HycoPoint pivot = Pivot(&point[lo], &point[lo + (hi - lo) / 2], &point[hi - 1], axis);
+    const HycoPoint pivot = NearestPivot(&point[lo], &point[lo + (hi - lo) / 2], &point[hi - 1], axis);
     PetscInt i = lo, j = hi - 1;
 
     while (i <= j) {
-      while (Before(&point[i], &pivot, axis)) i++;
-      while (Before(&pivot, &point[j], axis)) j--;
+      while (NearestPrecedes(&point[i], &pivot, axis)) i++;
+      while (NearestPrecedes(&pivot, &point[j], axis)) j--;
       if (i <= j) {
         const HycoPoint kept = point[i];
 
@@ -57,7 +57,7 @@ void HycoPointsSplit(HycoPoint point[], PetscInt lo, PetscInt mid, PetscInt hi, 
 
 #ifndef HYCO_EXPORTED
 /* Borrows the coordinates; the corners come first among the nodes, then the middles of sides. */
-static HycoCurved Curved(HycoPatches s, PetscInt patch)
+static HycoCurved NearestCurved(HycoPatches s, PetscInt patch)
 {
   HycoCurved facet = {.nf = s->nf, .corners = s->corners};
 
@@ -67,14 +67,14 @@ static HycoCurved Curved(HycoPatches s, PetscInt patch)
 
 #endif
 /* A box that contains a patch. Of first order the nodes bound the patch, also a bilinear one. */
-static void Enclose(HycoPatches s, PetscInt patch, HycoBox *b)
+static void NearestEnclose(HycoPatches s, PetscInt patch, HycoBox *b)
 {
   const PetscInt *node = s->node + patch * s->nf;
 
 #ifndef HYCO_EXPORTED
   /* A curved facet bulges beyond its nodes. */
   if (s->corners < s->nf) {
-    const HycoCurved facet = Curved(s, patch);
+    const HycoCurved facet = NearestCurved(s, patch);
 
     HycoCurvedBox(&facet, b->lo, b->hi);
     return;
@@ -106,7 +106,7 @@ static HycoBox VectorBox(PetscInt n, const HycoPoint item[], const PetscReal v[]
 }
 
 /* Builds box t of the items lo .. hi - 1, split at the median of the centres along its longest side. */
-static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
+static void NearestBuild(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
 {
   HycoBox *b = &s->box[t];
   PetscInt axis = 0;
@@ -118,7 +118,7 @@ static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
   for (PetscInt k = lo; k < hi; k++) {
     HycoBox one;
 
-    Enclose(s, s->item[k].index, &one);
+    NearestEnclose(s, s->item[k].index, &one);
     for (PetscInt c = 0; c < 3; c++) {
       b->lo[c] = PetscMin(b->lo[c], one.lo[c]);
       b->hi[c] = PetscMax(b->hi[c], one.hi[c]);
@@ -130,8 +130,8 @@ static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
   if (s->turn) s->turn[t] = VectorBox(hi - lo, s->item + lo, s->normal);
   if (hi - lo <= HYCO_LEAF) return;
   HycoPointsSplit(s->item, lo, (lo + hi) / 2, hi, axis);
-  Build(s, 2 * t + 1, lo, (lo + hi) / 2);
-  Build(s, 2 * t + 2, (lo + hi) / 2, hi);
+  NearestBuild(s, 2 * t + 1, lo, (lo + hi) / 2);
+  NearestBuild(s, 2 * t + 2, (lo + hi) / 2, hi);
 }
 
 /* A complete binary tree in an array, of the depth of the larger half at each split: no pointers, and children by
@@ -154,7 +154,7 @@ void HycoPatchesBuild(HycoPatches s)
       for (PetscInt a = 0; a < s->nf; a++) s->item[k].x[c] += s->X[3 * s->node[k * s->nf + a] + c] / s->nf;
     }
   }
-  Build(s, 0, 0, s->n);
+  NearestBuild(s, 0, 0, s->n);
 }
 /* -- end: in exported models too -- */
 
@@ -194,7 +194,7 @@ PetscErrorCode HycoPatchesDestroy(HycoPatches *patches)
 
 /* -- begin: in exported models too -- */
 /* Squared distance from x to the combination w of n points. */
-static PetscReal Distance2(PetscInt n, const PetscReal *const X[], const PetscReal w[], const PetscReal x[3])
+static PetscReal NearestDistance2(PetscInt n, const PetscReal *const X[], const PetscReal w[], const PetscReal x[3])
 {
   PetscReal sum = 0;
 
@@ -278,14 +278,14 @@ static PetscReal OnPatch(HycoPatches s, PetscInt patch, const PetscReal x[3], Pe
 
 #ifndef HYCO_EXPORTED
   if (s->corners < s->nf) {
-    const HycoCurved facet = Curved(s, patch);
+    const HycoCurved facet = NearestCurved(s, patch);
 
     return HycoCurvedProject(&facet, x, w);
   }
 #endif
   /* Edges are always tried: for a warped quadrilateral the inner stationary point need not be the nearest. */
   for (PetscInt a = 0; a < nf; a++) X[a] = s->X + 3 * s->node[patch * s->nf + a];
-  if ((nf == 3 && InTriangle(X, x, w)) || (nf == 4 && InQuadrilateral(X, x, w))) best = Distance2(nf, X, w, x);
+  if ((nf == 3 && InTriangle(X, x, w)) || (nf == 4 && InQuadrilateral(X, x, w))) best = NearestDistance2(nf, X, w, x);
   for (PetscInt k = 0; k < edges; k++) {
     const PetscInt l = (k + 1) % nf;
     PetscReal e[3], r[3], along[4] = {0, 0, 0, 0}, length, at, d;
@@ -298,7 +298,7 @@ static PetscReal OnPatch(HycoPatches s, PetscInt patch, const PetscReal x[3], Pe
     at = length > 0 ? PetscMin(PetscMax(HycoDot(e, r) / length, 0), 1) : 0;
     along[l] = at;
     along[k] = nf > 1 ? 1 - at : 1;
-    d = Distance2(nf, X, along, x);
+    d = NearestDistance2(nf, X, along, x);
     if (d >= best) continue;
     best = d;
     for (PetscInt a = 0; a < nf; a++) w[a] = along[a];
@@ -320,7 +320,7 @@ static PetscReal BoxDistance2(const HycoBox *b, const PetscReal x[3])
 }
 
 /* Whether a patch opposes the given normal; a patch without a normal always does. */
-static PetscBool Opposes(HycoPatches s, PetscInt patch, const PetscReal *against)
+static PetscBool NearestIsOpposed(HycoPatches s, PetscInt patch, const PetscReal *against)
 {
   const PetscReal *n = s->normal ? s->normal + 3 * patch : NULL;
 
@@ -349,7 +349,7 @@ static void SetBest(Query *q, PetscReal best, PetscInt patch, const PetscReal w[
 
 /* Updates the query with the nearest of the items lo .. hi - 1 under box t; the nearer child is searched first. Branch
    and bound: a box farther than the best so far is not entered. */
-static void Search(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, Query *q)
+static void NearestSearch(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, Query *q)
 {
   const PetscInt mid = (lo + hi) / 2;
   PetscBool right;
@@ -358,13 +358,13 @@ static void Search(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, Query *q
   if (hi - lo > HYCO_LEAF) {
     right = (PetscBool)(BoxDistance2(&s->box[2 * t + 2], q->x) < BoxDistance2(&s->box[2 * t + 1], q->x));
     for (PetscInt child = 0; child < 2; child++, right = (PetscBool)!right)
-      Search(s, 2 * t + 1 + right, right ? mid : lo, right ? hi : mid, q);
+      NearestSearch(s, 2 * t + 1 + right, right ? mid : lo, right ? hi : mid, q);
     return;
   }
   for (PetscInt k = lo; k < hi; k++) {
     PetscReal trial[HYCO_FACET_NODES] = {0}, d;
 
-    if (!Opposes(s, s->item[k].index, q->against)) continue;
+    if (!NearestIsOpposed(s, s->item[k].index, q->against)) continue;
     d = OnPatch(s, s->item[k].index, q->x, trial);
     /* Equal distances go to the smaller patch number, whatever the order of the search. */
     if (d < q->best || (d == q->best && s->item[k].index < q->patch)) SetBest(q, d, s->item[k].index, trial);
@@ -391,7 +391,7 @@ void HycoPatchesProject(HycoPatches s, const PetscReal x[3], const PetscReal aga
 
   q.round_off = ROUND_OFF * (LargestCoordinate(s->box[0].lo, s->box[0].hi) + LargestCoordinate(x, x));
   SetBest(&q, PETSC_MAX_REAL, 0, none);
-  Search(s, 0, 0, s->n, &q);
+  NearestSearch(s, 0, 0, s->n, &q);
   patch = q.patch;
   w = q.w;
   p->patch = patch;

@@ -47,8 +47,8 @@ struct _n_HycoPatches {
 PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, PetscInt corners, const PetscInt node[],
                                  const PetscReal normal[], HycoPatches *patches);
 PetscErrorCode HycoPatchesDestroy(HycoPatches *patches);
-/* The same in two steps, in the caller's memory: the number of boxes of n patches; the tree of patches whose members but
-   `box` and `item`, of which the room is there, are set. */
+/* The same in two steps, in the caller's memory: the number of boxes of n patches; the tree of patches whose members
+   but `box` and `item`, of which the room is there, are set. */
 PetscInt HycoPatchesBoxes(PetscInt n);
 void HycoPatchesBuild(HycoPatches patches);
 /* The patches' point nearest to x; among equally near ones that of the first patch, so that the result is the same

@@ -2,11 +2,11 @@
   Contacts without a free unknown, because all of their nodes are fixed. They have no effect, but the prescribed
   displacements may violate them; then no solution exists.
 */
-#include "facing.h"
+#include "surface_normals.h"
 #include <hycokinematics.h>
 
 /* Scale of the round-off of a gap: its terms may cancel. */
-static PetscReal Largest(const PetscReal v[], PetscInt n)
+static PetscReal EffectLargest(const PetscReal v[], PetscInt n)
 {
   PetscReal largest = 0;
 
@@ -20,14 +20,15 @@ PetscErrorCode HycoContactCheckStill(HycoFE fe, const HycoPairs *pairs, PetscInt
 {
   const PetscInt slave = pairs->slave[k], dim = fe->dim;
   /* The gap is a difference of positions: its round-off is theirs. */
-  PetscReal size = PetscMax(PetscAbsReal(gap) + Largest(fe->X + 3 * slave, 3) + Largest(fe->u0 + slave * dim, dim),
-                            HycoMeshLength(fe->mesh));
+  PetscReal size =
+      PetscMax(PetscAbsReal(gap) + EffectLargest(fe->X + 3 * slave, 3) + EffectLargest(fe->u0 + slave * dim, dim),
+               HycoMeshLength(fe->mesh));
 
   PetscFunctionBegin;
   for (PetscInt j = pairs->master_start[k]; j < pairs->master_start[k + 1]; j++) {
     const PetscInt i = pairs->master[j];
 
-    size = PetscMax(size, Largest(fe->X + 3 * i, 3) + Largest(fe->u0 + i * dim, dim));
+    size = PetscMax(size, EffectLargest(fe->X + 3 * i, 3) + EffectLargest(fe->u0 + i * dim, dim));
   }
   HycoCheck(*left >= -HYCO_ROUNDING * size,
             "contact %s: node %d is fixed%s, and its prescribed displacement penetrates by %g, so that no solution "

@@ -2,7 +2,7 @@
   Finds the masters of a contact's slave nodes on the mesh as drawn: projections on the other surface, checked by the
   orientation of the two; nodes without a master are listed. The types pass functions for what differs.
 */
-#include "facing.h"
+#include "surface_normals.h"
 #include "master_search.h"
 #include <stdlib.h>
 #include <string.h>
@@ -24,7 +24,7 @@ static int FarthestFirst(const void *a, const void *b)
 }
 
 /* Angle in degrees between a slave's normal and the direction to its master point, or between opposed normals. */
-static PetscReal Angle(const HycoMasterSearch *t, PetscInt slave, HycoVerdict why, const HycoProjection *at)
+static PetscReal PairingAngle(const HycoMasterSearch *t, PetscInt slave, HycoVerdict why, const HycoProjection *at)
 {
   const PetscReal *out = HycoMasterSearchOutward(t, slave);
   PetscReal r[3], cosine = -HycoDot(out, t->normal + 3 * at->patch);
@@ -35,7 +35,7 @@ static PetscReal Angle(const HycoMasterSearch *t, PetscInt slave, HycoVerdict wh
 }
 
 /* "12 (0.5 away, past its border)" */
-static PetscErrorCode Describe(HycoMasterSearch *t, const Missed *missed, size_t room, char text[])
+static PetscErrorCode PairingDescribe(HycoMasterSearch *t, const Missed *missed, size_t room, char text[])
 {
   HycoProjection at;
   PetscBool border = PETSC_FALSE;
@@ -50,15 +50,15 @@ static PetscErrorCode Describe(HycoMasterSearch *t, const Missed *missed, size_t
            (double)at.distance, border ? ", past its border" : "");
   used = strlen(text);
   if (missed->why == HYCO_TURNED || missed->why == HYCO_ASKEW)
-    snprintf(text + used, room - used, ", %.0f degrees %s", (double)Angle(t, missed->node, missed->why, &at),
+    snprintf(text + used, room - used, ", %.0f degrees %s", (double)PairingAngle(t, missed->node, missed->why, &at),
              missed->why == HYCO_TURNED ? "turned away from it" : "off the normal");
   PetscCall(PetscStrlcat(text, ")", room));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Fails with the number n of slave nodes without a master, the five farthest of them, and the remedy. */
-static PetscErrorCode Complain(HycoMasterSearch *t, HycoContact c, HycoRemedy remedy, PetscInt n, Missed missed[],
-                               const HycoMatch *m)
+static PetscErrorCode PairingReportUnmatched(HycoMasterSearch *t, HycoContact c, HycoRemedy remedy, PetscInt n,
+                                             Missed missed[], const HycoMatch *m)
 {
   char list[HYCO_LINE / 2] = "", what[HYCO_LINE];
   PetscInt *node;
@@ -70,7 +70,7 @@ static PetscErrorCode Complain(HycoMasterSearch *t, HycoContact c, HycoRemedy re
   for (PetscInt k = 0; k < PetscMin(n, 5); k++) {
     char one[HYCO_LINE / 2];
 
-    PetscCall(Describe(t, &missed[k], sizeof(one), one));
+    PetscCall(PairingDescribe(t, &missed[k], sizeof(one), one));
     if (k) PetscCall(PetscStrlcat(list, ", ", sizeof(list)));
     PetscCall(PetscStrlcat(list, one, sizeof(list)));
   }
@@ -150,14 +150,14 @@ static PetscErrorCode AppendMatched(HycoMasterSearch *t, HycoContact c, PetscInt
                     HycoContactAverages(c) ? HycoMasterSearchSide(t, m->slave[k]) : HYCO_ONE_SIDE, m->at[k].n,
                     m->at[k].node, m->at[k].weight);
   }
-  if (n_missed) PetscCall(Complain(t, c, remedy, n_missed, missed, m));
+  if (n_missed) PetscCall(PairingReportUnmatched(t, c, remedy, n_missed, missed, m));
   if (n_alone == m->n && !m->part) PetscCall(RefuseAll(t, c, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether slave i of a node's sides is kept, of which `best` is the first that is not worse than the others: each with a
-   master, if the normals are those of the sides; else the nearest, or the best. A slave that does not look at the master has
-   no contact if its surface goes round an edge: such a surface has them by nature. */
+/* Whether slave i of a node's sides is kept, of which `best` is the first that is not worse than the others: each with
+   a master, if the normals are those of the sides; else the nearest, or the best. A slave that does not look at the
+   master has no contact if its surface goes round an edge: such a surface has them by nature. */
 static PetscBool IsKept(const HycoMasterSearch *t, HycoContact c, const HycoMatch *m, PetscInt i, PetscInt best)
 {
   if (m->why[best] != HYCO_FOUND && m->why[best] != HYCO_FAR && (t->edges & HYCO_SLAVE_EDGE)) return PETSC_FALSE;
@@ -185,8 +185,8 @@ static void DropSides(const HycoMasterSearch *t, HycoContact c, HycoMatch *m)
 }
 
 /* The whole matching, once the search and the slave nodes exist. */
-static PetscErrorCode Match(HycoMasterSearch *t, HycoContact c, PetscInt index, HycoSettle settle, HycoRemedy remedy,
-                            HycoMatch *m, HycoPairs *p)
+static PetscErrorCode PairingMatch(HycoMasterSearch *t, HycoContact c, PetscInt index, HycoSettle settle,
+                                   HycoRemedy remedy, HycoMatch *m, HycoPairs *p)
 {
   HycoQuery query = {.moved = PETSC_FALSE};
   Missed *missed;
@@ -221,7 +221,7 @@ static PetscErrorCode Match(HycoMasterSearch *t, HycoContact c, PetscInt index, 
 }
 
 /* Whether a node is tied to nodes that take contact forces. */
-static PetscBool Follows(HycoMesh m, PetscInt node, const PetscBool carries[])
+static PetscBool PairingIsTied(HycoMesh m, PetscInt node, const PetscBool carries[])
 {
   const PetscInt tied = HycoMeshTied(m, node);
   PetscBool all = (PetscBool)(tied >= 0);
@@ -249,7 +249,7 @@ static PetscErrorCode FindSlaves(const HycoMasterSearch *t, PetscBool each, Pets
 
     PetscInt first = i, sides = 1;
 
-    if (!carries[i] || HycoMeshOwned(m, i) < 0 || Follows(m, i, carries)) continue;
+    if (!carries[i] || HycoMeshOwned(m, i) < 0 || PairingIsTied(m, i, carries)) continue;
     if (each) HycoMasterSearchSides(t, i, HYCO_ONE_SIDE, &first, &sides);
     for (PetscInt j = first; j < first + sides; j++) (*slave)[(*n)++] = j;
   }
@@ -272,7 +272,7 @@ PetscErrorCode HycoMasterSearchMatch(HycoContact c, HycoFE fe, PetscInt index, P
   /* Where the scene gives a normal, a node that is only listed has one contact. */
   PetscCall(FindSlaves(&t, (PetscBool)(settle || HycoContactAverages(c)), &m.n, &slave));
   m.slave = slave;
-  HycoFinally(Match(&t, c, index, settle, remedy, &m, pairs), PetscCall(PetscFree(slave));
+  HycoFinally(PairingMatch(&t, c, index, settle, remedy, &m, pairs), PetscCall(PetscFree(slave));
               PetscCall(HycoMasterSearchDestroy(&t)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -19,15 +19,15 @@ static PetscBool MayMeet(const HycoBox *b, const HycoPrism *p)
 }
 
 /* No order and no exact test: the caller cuts polygons anyway, and a missed patch would be an error. */
-static void Collect(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, const HycoPrism *p, PetscInt *n,
-                    PetscInt patch[])
+static void PrismCollect(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, const HycoPrism *p, PetscInt *n,
+                         PetscInt patch[])
 {
   const PetscInt mid = (lo + hi) / 2;
 
   if (!MayMeet(&s->box[t], p)) return;
   if (hi - lo > HYCO_LEAF) {
-    Collect(s, 2 * t + 1, lo, mid, p, n, patch);
-    Collect(s, 2 * t + 2, mid, hi, p, n, patch);
+    PrismCollect(s, 2 * t + 1, lo, mid, p, n, patch);
+    PrismCollect(s, 2 * t + 2, mid, hi, p, n, patch);
     return;
   }
   for (PetscInt k = lo; k < hi; k++) patch[(*n)++] = s->item[k].index;
@@ -38,7 +38,7 @@ PetscErrorCode HycoPatchesWithin(HycoPatches s, const HycoPrism *prism, PetscInt
 {
   PetscFunctionBegin;
   *n = 0;
-  Collect(s, 0, 0, s->n, prism, n, patch);
+  PrismCollect(s, 0, 0, s->n, prism, n, patch);
   PetscCall(PetscSortInt(*n, patch));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

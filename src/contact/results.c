@@ -18,8 +18,8 @@ static PetscErrorCode SumByNode(PetscSF sf, HycoMesh m, PetscReal value[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The pressures of one contact of the scene at nodes without area: with the middles of their facets, which may be slaves
-   of other ranks. size, force: of the contact's nodes. */
+/* The pressures of one contact of the scene at nodes without area: with the middles of their facets, which may be
+   slaves of other ranks. size, force: of the contact's nodes. */
 static void AddMiddles(HycoFE fe, const HycoPairs *pairs, PetscInt c, const PetscReal size[], const PetscReal force[],
                        PetscReal pressure[])
 {
@@ -79,8 +79,8 @@ PetscErrorCode HycoContactPressures(MPI_Comm comm, HycoFE fe, const HycoPairs *p
 }
 
 /* Adds the contribution of potential contact k; shear: the tangential force on the slave. */
-static void Add(HycoFE fe, const PetscReal x[3], const PetscReal normal[3], PetscReal area, PetscReal lambda,
-                const PetscReal shear[3], PetscReal pressure, HycoContactResult *r)
+static void ResultsAdd(HycoFE fe, const PetscReal x[3], const PetscReal normal[3], PetscReal area, PetscReal lambda,
+                       const PetscReal shear[3], PetscReal pressure, HycoContactResult *r)
 {
   const PetscBool around = (PetscBool)(fe->formulation == HYCO_AXISYMMETRIC);
   PetscReal push[3];
@@ -167,12 +167,12 @@ PetscErrorCode HycoContactResults(HycoFE fe, const HycoPairs *pairs, const Petsc
       if (q ? !of[k] : pairs->contact[k] != c) continue;
       r->n++;
       if (pairs->shear) r->friction_work += pairs->shear->work[k];
-      /* An open contact counts as 0, so that a seal that opens anywhere shows it. A node without area has no force of its
-         own, and the pressure of the middles beside it. */
+      /* An open contact counts as 0, so that a seal that opens anywhere shows it. A node without area has no force of
+         its own, and the pressure of the middles beside it. */
       r->pressure_min = PetscMin(r->pressure_min, lambda[k] > least || !(area[k] > 0) ? pressure[k] : 0);
       /* Forces of round-off are no contact: areas would jump by nodes that barely touch. */
       if (lambda[k] > least)
-        Add(fe, fe->X + 3 * pairs->slave[k], normal + 3 * k, area[k], lambda[k], shear, pressure[k], r);
+        ResultsAdd(fe, fe->X + 3 * pairs->slave[k], normal + 3 * k, area[k], lambda[k], shear, pressure[k], r);
     }
   }
   PetscCall(PetscFree(of));

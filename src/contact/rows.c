@@ -1,5 +1,5 @@
 /* B and D: the rows of the potential contacts at the current parameters. */
-#include "facing.h"
+#include "surface_normals.h"
 #include <hycokinematics.h>
 #include <hycovector.h>
 
@@ -40,8 +40,8 @@ static void AddToRow(HycoFE fe, PetscInt node, PetscReal scale, const PetscReal 
   }
 }
 
-/* Row r, of contact k along a direction: slave with the direction, masters with minus the weight times it; fixed unknowns
-   move to D. */
+/* Row r, of contact k along a direction: slave with the direction, masters with minus the weight times it; fixed
+   unknowns move to D. */
 static void AddRow(HycoFE fe, const HycoPairs *pairs, PetscInt k, const PetscReal along[3], PetscInt r, HycoRows *rows)
 {
   PetscInt n = rows->start[r];
@@ -88,9 +88,9 @@ static PetscErrorCode CheckCorner(HycoFE fe, const HycoPairs *pairs, PetscInt k,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether contacts k and j of one slave are parts of one smooth surface: normals averaged over each part differ there by
-   the angle between facets, and the rows, although independent, would leave the force to either contact. Normals that
-   the scene gives for both are taken as they are. */
+/* Whether contacts k and j of one slave are parts of one smooth surface: normals averaged over each part differ there
+   by the angle between facets, and the rows, although independent, would leave the force to either contact. Normals
+   that the scene gives for both are taken as they are. */
 static PetscBool AreSmooth(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscInt j, const PetscReal normal[])
 {
   const HycoContact *of = fe->scene->contact;
@@ -161,9 +161,9 @@ PetscErrorCode HycoRowsDestroy(HycoRows *rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Room for n rows, up to `each` for a contact, with the masters of now: after the search of masters alone they are known.
-   One more than needed: arrays of no rows are not NULL. It only grows, since positions repeat along a study. */
-static PetscErrorCode Reserve(HycoFE fe, const HycoPairs *pairs, PetscInt n, PetscInt each, HycoRows *rows)
+/* Room for n rows, up to `each` for a contact, with the masters of now: after the search of masters alone they are
+   known. One more than needed: arrays of no rows are not NULL. It only grows, since positions repeat along a study. */
+static PetscErrorCode ContactRowReserve(HycoFE fe, const HycoPairs *pairs, PetscInt n, PetscInt each, HycoRows *rows)
 {
   const PetscInt entries = (pairs->n + pairs->master_start[pairs->n]) * fe->dim * each + 1;
 
@@ -205,7 +205,7 @@ PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, HycoRows *rows)
   ierr = HycoContactGeometry(fe, pairs, normal, drawn);
   /* With the normals of these parameters: they turn with the bodies. */
   if (!ierr) ierr = CheckCorners(fe, pairs, normal);
-  if (!ierr) ierr = Reserve(fe, pairs, pairs->n, 1, rows);
+  if (!ierr) ierr = ContactRowReserve(fe, pairs, pairs->n, 1, rows);
   for (PetscInt k = 0; k < pairs->n && !ierr; k++) ierr = AddNormal(fe, pairs, k, normal + 3 * k, drawn[k], k, rows);
   PetscCall(PetscFree2(normal, drawn));
   PetscCall(ierr);
@@ -213,9 +213,9 @@ PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, HycoRows *rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Unit vectors orthogonal to the normal: one in 2D; two in 3D, the first orthogonal to the axis that is farthest from the
-   normal. */
-static void Tangents(PetscInt dim, const PetscReal n[3], PetscReal t[6])
+/* Unit vectors orthogonal to the normal: one in 2D; two in 3D, the first orthogonal to the axis that is farthest from
+   the normal. */
+static void ContactRowTangents(PetscInt dim, const PetscReal n[3], PetscReal t[6])
 {
   PetscReal axis[3] = {0, 0, 0};
   PetscInt least = 0;
@@ -246,12 +246,12 @@ PetscErrorCode HycoContactTangentRows(HycoFE fe, HycoPairs *pairs, const PetscIn
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(3 * pairs->n, &normal, pairs->n, &drawn));
   ierr = HycoContactGeometry(fe, pairs, normal, drawn);
-  if (!ierr) ierr = Reserve(fe, pairs, row[pairs->n], fe->dim, rows);
+  if (!ierr) ierr = ContactRowReserve(fe, pairs, row[pairs->n], fe->dim, rows);
   for (PetscInt k = 0; k < pairs->n && !ierr; k++) {
     PetscReal jump[3];
 
     /* Any orthonormal pair: the law is isotropic in the plane. */
-    Tangents(fe->dim, normal + 3 * k, tangent + 6 * k);
+    ContactRowTangents(fe->dim, normal + 3 * k, tangent + 6 * k);
     HycoPairsJump(pairs, k, fe->dim, u, jump);
     ierr = AddNormal(fe, pairs, k, normal + 3 * k, drawn[k], row[k], rows);
     for (PetscInt r = row[k] + 1; r < row[k + 1]; r++) {

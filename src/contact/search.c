@@ -20,8 +20,8 @@ static PetscErrorCode FindMiss(HycoMasterSearch *t, PetscInt slave, const HycoPr
 }
 
 /* Verdict on a slave as drawn: met, turned away, too far, askew (its normal misses the master point), past the
-   border. Within `small` the direction is round-off and is not judged. On a surface that goes round an edge, of which parts
-   face nothing by nature, only a slave in front of the master is too far. */
+   border. Within `small` the direction is round-off and is not judged. On a surface that goes round an edge, of which
+   parts face nothing by nature, only a slave in front of the master is too far. */
 PetscErrorCode HycoMasterSearchJudge(HycoMasterSearch *t, PetscInt slave, PetscReal tolerance, PetscReal small,
                                      HycoProjection *at, HycoVerdict *why)
 {
@@ -51,7 +51,7 @@ PetscErrorCode HycoMasterSearchJudge(HycoMasterSearch *t, PetscInt slave, PetscR
 
 /* On moved surfaces; n = 0: it has no master. reach: masters beyond it are none, as in training; a large number
    otherwise. */
-static PetscErrorCode Follow(HycoMasterSearch *t, PetscInt slave, PetscReal reach, HycoProjection *at)
+static PetscErrorCode MasterSearchUpdate(HycoMasterSearch *t, PetscInt slave, PetscReal reach, HycoProjection *at)
 {
   PetscBool past;
 
@@ -75,7 +75,7 @@ static PetscErrorCode AnswerAll(HycoMasterSearch *t, const HycoQuery *q, PetscIn
     why[k] = HYCO_FOUND;
     /* On moved surfaces every slave stays a contact, with or without a master: no verdict. */
     if (q->moved)
-      PetscCall(Follow(t, slave[k], q->tolerance, &at[k]));
+      PetscCall(MasterSearchUpdate(t, slave[k], q->tolerance, &at[k]));
     else
       PetscCall(HycoMasterSearchJudge(t, slave[k], q->tolerance, q->small, &at[k], &why[k]));
   }

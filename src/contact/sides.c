@@ -1,9 +1,9 @@
 /*
-  The sides of a surface that goes round an edge. At a node whose facets lie on both sides of an edge a mean normal belongs
-  to no side, and the area of a facet that faces nothing carries no force: there each side is a surface of its own, with
-  its own normal, area and contact.
+  The sides of a surface that goes round an edge. At a node whose facets lie on both sides of an edge a mean normal
+  belongs to no side, and the area of a facet that faces nothing carries no force: there each side is a surface of its
+  own, with its own normal, area and contact.
 */
-#include "facing.h"
+#include "surface_normals.h"
 #include "nearest.h"
 #include <hycokinematics.h>
 #include <hycovector.h>
@@ -42,8 +42,9 @@ static PetscErrorCode FindNormals(HycoScene scene, HycoMesh m, PetscReal normal[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the facet of place k comes before that of place j: by the tags of its nodes, which every part of a mesh has. */
-static PetscErrorCode Precedes(HycoMesh m, PetscInt k, PetscInt j, PetscBool *before)
+/* Whether the facet of place k comes before that of place j: by the tags of its nodes, which every part of a mesh
+   has. */
+static PetscErrorCode SidesPrecedes(HycoMesh m, PetscInt k, PetscInt j, PetscBool *before)
 {
   PetscInt tag[2][HYCO_FACET_NODES], a = 0;
 
@@ -67,7 +68,7 @@ static PetscErrorCode FollowChain(Star *s, PetscInt k, PetscInt side, PetscInt *
     PetscBool before;
 
     if (s->side[other] != HYCO_ONE_SIDE || HycoDot(s->normal + 3 * s->place[k], s->normal + 3 * other) < EDGE) continue;
-    PetscCall(Precedes(s->m, other, *first, &before));
+    PetscCall(SidesPrecedes(s->m, other, *first, &before));
     if (before) *first = other;
     PetscCall(FollowChain(s, i, side, first));
   }
@@ -94,7 +95,7 @@ static PetscErrorCode DivideNode(Star *s)
   for (PetscInt t = 0; t < n * n && n <= s->m->dim; t++) {
     PetscBool before = PETSC_FALSE;
 
-    if (t / n != t % n) PetscCall(Precedes(s->m, first[t % n], first[t / n], &before));
+    if (t / n != t % n) PetscCall(SidesPrecedes(s->m, first[t % n], first[t / n], &before));
     number[t / n] += before;
   }
   for (PetscInt k = 0; k < s->n; k++) {
@@ -137,7 +138,7 @@ static PetscErrorCode RankFacets(Star *s, const Corner corner[])
            j += way) {
         PetscBool before;
 
-        PetscCall(Precedes(m, corner[j].place, of->place, &before));
+        PetscCall(SidesPrecedes(m, corner[j].place, of->place, &before));
         s->rank[of->place] += before;
       }
     }
@@ -304,8 +305,8 @@ static PetscErrorCode AddFacets(Sums *s, PetscInt group, PetscBool tied)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The integrals of N n dS (vector, n x 3) and of N dS (share) over the sides of the contacts that have one; other entries
-   stay. Either may be NULL. */
+/* The integrals of N n dS (vector, n x 3) and of N dS (share) over the sides of the contacts that have one; other
+   entries stay. Either may be NULL. */
 PetscErrorCode HycoSideSums(HycoFE fe, PetscInt group, PetscInt n, const PetscInt node[], const PetscInt side[],
                             PetscReal vector[], PetscReal share[])
 {

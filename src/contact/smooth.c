@@ -4,7 +4,7 @@
   normal motion of a body of revolution that rotates in its seat is then zero, however irregular its facets are. Facets
   of second order have their own normal at each node; their mean is used.
 */
-#include "facing.h"
+#include "surface_normals.h"
 #include <hycokinematics.h>
 #include <hycovector.h>
 
@@ -14,13 +14,13 @@
 #define FLAT 1e-6
 
 /* Whether place k of the facets counts at its node. */
-static PetscBool Counts(HycoMesh m, const PetscInt side[], PetscInt k)
+static PetscBool SmoothNormalCounts(HycoMesh m, const PetscInt side[], PetscInt k)
 {
   return (PetscBool)(side[m->facets[k]] < 0 || m->facet_side[k] == side[m->facets[k]]);
 }
 
 /* The weight of the normal of a facet with nf corners at its corner v, from the next and the previous corner. */
-static PetscReal Weight(HycoFE fe, PetscInt nf, const PetscInt node[], PetscInt v)
+static PetscReal SmoothNormalWeight(HycoFE fe, PetscInt nf, const PetscInt node[], PetscInt v)
 {
   const PetscInt next = node[(v + 1) % nf], last = node[(v + nf - 1) % nf];
   const PetscReal *x = fe->X + 3 * node[v];
@@ -55,9 +55,9 @@ static PetscErrorCode AddFacets(HycoFE fe, PetscInt group, Surface *s)
     for (PetscInt c = 0; c < 3; c++) unit[c] = n[c];
     HycoNormalise(unit);
     for (PetscInt v = 0; v < corners; v++) {
-      const PetscReal weight = Weight(fe, corners, node, v);
+      const PetscReal weight = SmoothNormalWeight(fe, corners, node, v);
 
-      if (!Counts(m, s->side, f * m->nf + v)) continue;
+      if (!SmoothNormalCounts(m, s->side, f * m->nf + v)) continue;
       for (PetscInt c = 0; c < 3; c++) {
         s->exact[3 * node[v] + c] += weight * unit[c];
         s->mean[3 * node[v] + c] += n[c];
@@ -94,7 +94,7 @@ static PetscErrorCode AddNodeNormals(HycoFE fe, PetscInt group, Surface *s)
   for (PetscInt k = 0; k < m->n_facets * m->nf; k++) {
     PetscReal n[3];
 
-    if (m->facet_group[k / m->nf] != group || !Counts(m, s->side, k)) continue;
+    if (m->facet_group[k / m->nf] != group || !SmoothNormalCounts(m, s->side, k)) continue;
     PetscCall(NormalAt(fe, k / m->nf, k % m->nf, n));
     for (PetscInt c = 0; c < 3; c++) {
       s->exact[3 * m->facets[k] + c] += n[c];
@@ -115,7 +115,7 @@ static PetscErrorCode FindBends(HycoFE fe, PetscInt group, Surface *s, PetscReal
     const PetscInt i = m->facets[k];
     PetscReal n[3];
 
-    if (m->facet_group[k / m->nf] != group || !Counts(m, s->side, k)) continue;
+    if (m->facet_group[k / m->nf] != group || !SmoothNormalCounts(m, s->side, k)) continue;
     PetscCall(NormalAt(fe, k / m->nf, k % m->nf, n));
     /* Twice the distance from the mean is about the largest angle between the facets. */
     s->bend[i] = PetscMax(s->bend[i], 2 * HycoDistance(n, s->mean + 3 * i));
@@ -130,7 +130,7 @@ static PetscErrorCode FindBends(HycoFE fe, PetscInt group, Surface *s, PetscReal
       if (bend < EDGE) most = PetscMax(most, bend);
     }
     for (PetscInt v = 0; v < m->nf; v++) {
-      if (Counts(m, s->side, f * m->nf + v))
+      if (SmoothNormalCounts(m, s->side, f * m->nf + v))
         wide[m->facets[f * m->nf + v]] = PetscMax(wide[m->facets[f * m->nf + v]], most);
     }
   }

@@ -3,11 +3,11 @@
   integrals of mortar contacts), or of the nearest point of the master's facets. Also contacts on tied nodes, which have
   no displacement of their own.
 */
-#include "facing.h"
+#include "surface_normals.h"
 #include "mortar.h"
 
-/* By node of the mesh: the tie of which it is a slave (-1: none), the nearest point of its master, its row in `mean` (-1:
-   it follows the nearest point). */
+/* By node of the mesh: the tie of which it is a slave (-1: none), the nearest point of its master, its row in `mean`
+   (-1: it follows the nearest point). */
 typedef struct {
   PetscInt *tie, *row;
   HycoProjection *at;
@@ -33,8 +33,8 @@ static PetscErrorCode MakePatches(HycoMesh m, PetscInt group, PetscInt node[], P
 
 /* Finds the points that the slave nodes follow; nodes on both surfaces need none. On the mesh as drawn: a tie glues
    what lies together there, whatever a map does afterwards. */
-static PetscErrorCode Project(HycoScene s, HycoMesh m, PetscInt k, PetscInt group, HycoPatches patches,
-                              const PetscBool on[], Found *found)
+static PetscErrorCode TieProject(HycoScene s, HycoMesh m, PetscInt k, PetscInt group, HycoPatches patches,
+                                 const PetscBool on[], Found *found)
 {
   const HycoTie *tie = &s->tie[k];
   const PetscInt lo = m->group_start[group], n = m->group_start[group + 1] - lo;
@@ -87,13 +87,13 @@ static PetscErrorCode FindOne(HycoScene s, HycoMesh m, PetscInt k, Found *found)
   PetscCall(PetscMalloc1(m->n_facets * m->nf, &node));
   PetscCall(PetscCalloc1(m->n_nodes, &on));
   PetscCall(MakePatches(m, master, node, on, &patches));
-  HycoFinally(Project(s, m, k, slave, patches, on, found), PetscCall(HycoPatchesDestroy(&patches));
+  HycoFinally(TieProject(s, m, k, slave, patches, on, found), PetscCall(HycoPatchesDestroy(&patches));
               HycoFreeAll(&node, &on));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The masters of tied node i and their weights; returns their number. */
-static PetscInt Masters(const Found *found, PetscInt i, const PetscInt **node, const PetscReal **weight)
+static PetscInt TieMasters(const Found *found, PetscInt i, const PetscInt **node, const PetscReal **weight)
 {
   PetscInt n = found->at[i].n;
 
@@ -110,7 +110,7 @@ static PetscErrorCode CheckChains(HycoScene s, HycoMesh m, const Found *found)
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     const PetscInt *node;
     const PetscReal *weight;
-    const PetscInt n = Masters(found, i, &node, &weight);
+    const PetscInt n = TieMasters(found, i, &node, &weight);
 
     for (PetscInt a = 0; a < n; a++) {
       const PetscInt other = found->tie[node[a]];
@@ -128,8 +128,8 @@ static PetscErrorCode CheckChains(HycoScene s, HycoMesh m, const Found *found)
 
 /* -- means -- */
 
-/* What a tied node shares with its masters, by node: supports (bit c: component c) and groups of contacts and of supports
-   along a direction. */
+/* What a tied node shares with its masters, by node: supports (bit c: component c) and groups of contacts and of
+   supports along a direction. */
 typedef struct {
   PetscInt n_groups, *group, *held;
 } Shared;
@@ -170,13 +170,13 @@ static PetscBool IsIn(HycoMesh m, PetscInt group, PetscInt node)
   return (PetscBool)(at >= 0);
 }
 
-/* Whether node i can follow its mean: the masters are not tied and have its supports and contacts, as those of the nearest
-   point have where a plane of symmetry or a contact crosses the tie. */
+/* Whether node i can follow its mean: the masters are not tied and have its supports and contacts, as those of the
+   nearest point have where a plane of symmetry or a contact crosses the tie. */
 static PetscBool CanFollow(HycoMesh m, const Shared *shared, const Found *found, PetscInt i)
 {
   const PetscInt *node;
   const PetscReal *weight;
-  const PetscInt n = Masters(found, i, &node, &weight);
+  const PetscInt n = TieMasters(found, i, &node, &weight);
 
   for (PetscInt a = 0; a < n; a++) {
     /* Masters must have every support that the slave has: otherwise the support would act on a node that does not move
@@ -222,8 +222,8 @@ static PetscErrorCode TryMeans(HycoFE fe, PetscInt k, const Shared *shared, Hyco
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The means of tie k. Nodes of both surfaces are pinned to themselves. A new pin changes the rows around it, so that they
-   are computed again. */
+/* The means of tie k. Nodes of both surfaces are pinned to themselves. A new pin changes the rows around it, so that
+   they are computed again. */
 static PetscErrorCode FindMeans(HycoFE fe, PetscInt k, const Shared *shared, Found *found)
 {
   HycoMesh m = fe->mesh;
@@ -287,7 +287,7 @@ static PetscErrorCode CheckRoom(HycoScene s, HycoMesh m, const Found *found)
     for (PetscInt v = 0; v < m->nv; v++) {
       const PetscInt *node, i = m->cells[e * m->nv + v];
       const PetscReal *weight;
-      const PetscInt masters = Masters(found, i, &node, &weight);
+      const PetscInt masters = TieMasters(found, i, &node, &weight);
 
       if (masters) tie = found->tie[i];
       /* A master that several nodes of the cell follow counts once. Marked afterwards, with the number of the cell,
@@ -307,13 +307,13 @@ static PetscErrorCode CheckRoom(HycoScene s, HycoMesh m, const Found *found)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How far a slave may be from the point of its masters: the tolerance, which allows for round-off of maps. The mean may be
-   farther than the nearest point. */
-static PetscReal Reach(HycoMesh m, const Found *found, PetscInt i)
+/* How far a slave may be from the point of its masters: the tolerance, which allows for round-off of maps. The mean may
+   be farther than the nearest point. */
+static PetscReal TieReach(HycoMesh m, const Found *found, PetscInt i)
 {
   const PetscInt *node;
   const PetscReal *weight;
-  const PetscInt n = Masters(found, i, &node, &weight);
+  const PetscInt n = TieMasters(found, i, &node, &weight);
   PetscReal at[3] = {0, 0, 0};
 
   for (PetscInt a = 0; a < n; a++) {
@@ -325,7 +325,7 @@ static PetscReal Reach(HycoMesh m, const Found *found, PetscInt i)
 }
 
 /* Entries by ascending slave node, which HycoMeshSetTies() relies on. */
-static PetscErrorCode Find(HycoScene s, HycoMesh m, Found *found, HycoTies *ties)
+static PetscErrorCode TieFind(HycoScene s, HycoMesh m, Found *found, HycoTies *ties)
 {
   PetscInt n = 0;
   HycoTies t;
@@ -342,7 +342,7 @@ static PetscErrorCode Find(HycoScene s, HycoMesh m, Found *found, HycoTies *ties
     const PetscReal *weight;
 
     /* Counted first: the arrays have exactly these entries. */
-    n += Masters(found, i, &node, &weight);
+    n += TieMasters(found, i, &node, &weight);
   }
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoTiesCreate(n, m->type, ties));
@@ -351,7 +351,7 @@ static PetscErrorCode Find(HycoScene s, HycoMesh m, Found *found, HycoTies *ties
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     const PetscInt *node;
     const PetscReal *weight;
-    const PetscInt masters = Masters(found, i, &node, &weight);
+    const PetscInt masters = TieMasters(found, i, &node, &weight);
 
     for (PetscInt a = 0; a < masters; a++, n++) {
       t->slave[n] = m->node_id[i];
@@ -359,7 +359,7 @@ static PetscErrorCode Find(HycoScene s, HycoMesh m, Found *found, HycoTies *ties
       t->tie[n] = found->tie[i];
       t->body[n] = m->node_body[node[a]];
       t->weight[n] = weight[a];
-      t->reach[n] = Reach(m, found, i);
+      t->reach[n] = TieReach(m, found, i);
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -378,7 +378,7 @@ PetscErrorCode HycoTiesFind(HycoScene s, HycoMesh m, HycoTies *ties)
   PetscCall(HycoPairsReserve(&found.mean, 0, 0));
   PetscCall(
       PetscMalloc4(m->n_nodes, &found.tie, m->n_nodes, &found.row, m->n_nodes, &found.at, s->n_ties, &found.tolerance));
-  HycoFinally(Find(s, m, &found, ties), PetscCall(PetscFree4(found.tie, found.row, found.at, found.tolerance));
+  HycoFinally(TieFind(s, m, &found, ties), PetscCall(PetscFree4(found.tie, found.row, found.at, found.tolerance));
               PetscCall(HycoPairsDestroy(&found.mean)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -408,7 +408,7 @@ static PetscErrorCode CheckMasters(HycoScene s, HycoMesh m)
 }
 
 /* Whether all masters of a tied slave are slaves of its contact. has: by node, its last contact. */
-static PetscBool Followed(HycoMesh m, PetscInt tied, PetscInt contact, const PetscInt has[])
+static PetscBool TieIsFollowed(HycoMesh m, PetscInt tied, PetscInt contact, const PetscInt has[])
 {
   for (PetscInt j = m->tied_start[tied]; j < m->tied_start[tied + 1]; j++) {
     if (has[m->tied_master[j]] != contact) return PETSC_FALSE;
@@ -417,7 +417,8 @@ static PetscBool Followed(HycoMesh m, PetscInt tied, PetscInt contact, const Pet
 }
 
 /* which: the contacts that are kept. */
-static PetscErrorCode Choose(HycoScene s, HycoMesh m, const HycoPairs *p, PetscInt has[], PetscInt *n, PetscInt which[])
+static PetscErrorCode TieChoose(HycoScene s, HycoMesh m, const HycoPairs *p, PetscInt has[], PetscInt *n,
+                                PetscInt which[])
 {
   PetscFunctionBegin;
   *n = 0;
@@ -432,7 +433,7 @@ static PetscErrorCode Choose(HycoScene s, HycoMesh m, const HycoPairs *p, PetscI
       if (tied < 0) which[(*n)++] = j;
       /* Its masters' contacts may be on the owner only. */
       if (HycoMeshOwned(m, p->slave[j]) < 0) continue; /* of another rank */
-      HycoCheck(tied < 0 || Followed(m, tied, p->contact[k], has),
+      HycoCheck(tied < 0 || TieIsFollowed(m, tied, p->contact[k], has),
                 "contact %s: node %d is a slave of the tie %s, and its master nodes do not have this contact; exchange "
                 "slave and master of the tie, or remove the node from the contact",
                 s->contact[p->contact[k]]->name, (int)m->node_id[p->slave[j]],
@@ -454,7 +455,7 @@ PetscErrorCode HycoPairsDropTied(HycoScene s, HycoMesh m, HycoPairs *p)
   if (!m->n_tied) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(CheckMasters(s, m));
   PetscCall(PetscMalloc2(m->n_nodes, &has, p->n, &which));
-  ierr = Choose(s, m, p, has, &n, which);
+  ierr = TieChoose(s, m, p, has, &n, which);
   if (!ierr && n < p->n) {
     /* A selection keeps the order, in which contacts are numbered. */
     ierr = HycoPairsSelect(p, n, which, NULL, &kept);

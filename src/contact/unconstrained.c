@@ -27,7 +27,7 @@ typedef struct {
 
 /* A slave that faces nothing meets no resistance. Motions are orthonormal over all unknowns, so that d is small for
    large meshes; tolerances are scaled accordingly. */
-static void Relative(Shapes *s, const HycoMotions *motions)
+static void FreeMotionRelative(Shapes *s, const HycoMotions *motions)
 {
   for (PetscInt i = 0; i < s->m; i++) {
     for (PetscInt a = 0; a < s->k && !HycoPairsAlone(s->fe->scene, s->pairs, i); a++)
@@ -50,8 +50,8 @@ static PetscInt WideNode(const Shapes *s, PetscInt node)
   return s->index ? s->index[node] : node;
 }
 
-/* The normals of a contact's slaves in one layer: at a slave with several contacts that of one of them. side, work: of the
-   nodes. */
+/* The normals of a contact's slaves in one layer: at a slave with several contacts that of one of them. side, work: of
+   the nodes. */
 static PetscErrorCode SlaveSenses(Shapes *s, PetscInt contact, PetscInt layer, PetscInt side[], PetscReal work[],
                                   PetscBool *more)
 {
@@ -159,7 +159,7 @@ static PetscErrorCode FindAllSenses(Shapes *s)
 }
 
 /* The displacement at contact i under the combination z. */
-static void Combine(const Shapes *s, PetscInt i, const PetscReal z[], PetscReal d[3])
+static void FreeMotionCombine(const Shapes *s, PetscInt i, const PetscReal z[], PetscReal d[3])
 {
   for (PetscInt c = 0; c < 3; c++) {
     d[c] = 0;
@@ -168,15 +168,15 @@ static void Combine(const Shapes *s, PetscInt i, const PetscReal z[], PetscReal 
 }
 
 /* Whether contact i resists tangential motions as well. */
-static PetscBool Rubs(const Shapes *s, PetscInt i)
+static PetscBool FreeMotionHasFriction(const Shapes *s, PetscInt i)
 {
   return (PetscBool)(s->fe->scene->contact[s->pairs->contact[i]]->friction != NULL);
 }
 
 /* The eigenvectors of sum of (n.d / doubt)^2 against sum of |d|^2, in A (k x k), values ascending. Only the ratio
    matters: how far a motion is from tangential, in units of the normals' errors, against its size. */
-static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const PetscReal weight[], PetscReal A[],
-                               PetscReal M[], PetscReal values[])
+static PetscErrorCode FreeMotionSpectrum(const Shapes *s, const PetscInt sense[], const PetscReal weight[],
+                                         PetscReal A[], PetscReal M[], PetscReal values[])
 {
   const PetscInt k = s->k;
   PetscBLASInt n, one = 1, lwork, info;
@@ -199,9 +199,9 @@ static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const Pe
     if (HycoPairsAlone(s->fe->scene, s->pairs, i)) continue;
     for (PetscInt a = 0; a < k; a++) {
       for (PetscInt b = 0; b < k; b++) {
-        const PetscReal both =
-            Rubs(s, i) ? HycoDot(d + 3 * a, d + 3 * b)
-                       : HycoDot(s->normal[t] + 3 * i, d + 3 * a) * HycoDot(s->normal[t] + 3 * i, d + 3 * b);
+        const PetscReal both = FreeMotionHasFriction(s, i) ? HycoDot(d + 3 * a, d + 3 * b)
+                                                           : HycoDot(s->normal[t] + 3 * i, d + 3 * a) *
+                                                                 HycoDot(s->normal[t] + 3 * i, d + 3 * b);
 
         A[a * k + b] += weight[i] * both / (s->doubt[t][i] * s->doubt[t][i]);
         M[a * k + b] += HycoDot(d + 3 * a, d + 3 * b);
@@ -219,8 +219,8 @@ static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const Pe
 /* Whether the combination z is tangential at every contact; raises the weights of the contacts where it is not. The
    mean over contacts may hide one that resists: each is tested alone, and a violated one counts 100 times more in
    the next round. */
-static PetscErrorCode Tangential(const Shapes *s, const PetscInt sense[], const PetscReal z[], PetscReal weight[],
-                                 PetscBool *tangential)
+static PetscErrorCode FreeMotionTangential(const Shapes *s, const PetscInt sense[], const PetscReal z[],
+                                           PetscReal weight[], PetscBool *tangential)
 {
   /* Motions have the length of all unknowns together. */
   const PetscReal noise = 1e-9 / PetscSqrtReal((PetscReal)HycoFEUnknowns(s->fe));
@@ -233,10 +233,10 @@ static PetscErrorCode Tangential(const Shapes *s, const PetscInt sense[], const 
     const PetscInt t = sense[s->pairs->contact[i]];
     PetscReal d[3];
 
-    Combine(s, i, z, d);
+    FreeMotionCombine(s, i, z, d);
     /* Within twice the normal's error, or within what the surface bends between its nodes. */
-    if ((Rubs(s, i) ? HycoLength(d) : PetscAbsReal(HycoDot(s->normal[t] + 3 * i, d))) <=
-        (Rubs(s, i) ? 0 : PetscMax(2 * s->doubt[t][i], s->bend[t][i]) * PetscSqrtReal(HycoDot(d, d))) +
+    if ((FreeMotionHasFriction(s, i) ? HycoLength(d) : PetscAbsReal(HycoDot(s->normal[t] + 3 * i, d))) <=
+        (FreeMotionHasFriction(s, i) ? 0 : PetscMax(2 * s->doubt[t][i], s->bend[t][i]) * PetscSqrtReal(HycoDot(d, d))) +
             noise * PetscSqrtReal(norm))
       continue;
     weight[i] *= 100;
@@ -248,7 +248,7 @@ static PetscErrorCode Tangential(const Shapes *s, const PetscInt sense[], const 
 
 /* The combinations that are tangential for these normals: z (room k x k, rows of length 1), *n of them. The subspace
    is at first that of the mean; rounds with raised weights turn it away from contacts that resist. */
-static PetscErrorCode Null(const Shapes *s, const PetscInt sense[], PetscReal z[], PetscInt *n)
+static PetscErrorCode FreeMotionNull(const Shapes *s, const PetscInt sense[], PetscReal z[], PetscInt *n)
 {
   const PetscInt k = s->k;
   PetscReal *A, *M, *values, *weight;
@@ -258,7 +258,7 @@ static PetscErrorCode Null(const Shapes *s, const PetscInt sense[], PetscReal z[
   PetscCall(PetscMalloc4(k * k, &A, k * k, &M, k, &values, s->m, &weight));
   for (PetscInt i = 0; i < s->m; i++) weight[i] = 1;
   for (PetscInt round = 0; round < 8 && !all; round++) {
-    PetscCall(Spectrum(s, sense, weight, A, M, values));
+    PetscCall(FreeMotionSpectrum(s, sense, weight, A, M, values));
     all = PETSC_TRUE;
     *n = 0;
     /* Ratios of at most 1: on the mean within the normals' errors. */
@@ -266,7 +266,7 @@ static PetscErrorCode Null(const Shapes *s, const PetscInt sense[], PetscReal z[
       PetscBool good;
       PetscReal norm = 0;
 
-      PetscCall(Tangential(s, sense, A + a * k, weight, &good));
+      PetscCall(FreeMotionTangential(s, sense, A + a * k, weight, &good));
       all = (PetscBool)(all && good);
       /* Left out in this round; the raised weights turn the eigenvectors of the next. */
       if (!good) continue;
@@ -280,7 +280,7 @@ static PetscErrorCode Null(const Shapes *s, const PetscInt sense[], PetscReal z[
 }
 
 /* Adds to the orthonormal rows of `basis` the component of row z that is orthogonal to them. */
-static void Join(PetscInt k, const PetscReal z[], PetscReal basis[], PetscInt *n)
+static void FreeMotionJoin(PetscInt k, const PetscReal z[], PetscReal basis[], PetscInt *n)
 {
   PetscReal *v = basis + *n * k, norm = 0;
 
@@ -319,7 +319,7 @@ static PetscErrorCode HasSense(const Shapes *s, PetscInt contact, PetscInt sense
 
 /* The normals of choice number `code`; *possible: each contact has them. Collective. With up to three contacts a code
    has one digit (base 3) for each. 3^n combinations are tried, since each contact's better normal is not known. */
-static PetscErrorCode Senses(const Shapes *s, PetscInt code, PetscInt sense[], PetscBool *possible)
+static PetscErrorCode FreeMotionSenses(const Shapes *s, PetscInt code, PetscInt sense[], PetscBool *possible)
 {
   const PetscBool common = (PetscBool)(s->fe->scene->n_contacts > MOST_CONTACTS); /* as far as available */
 
@@ -344,8 +344,8 @@ static PetscErrorCode Senses(const Shapes *s, PetscInt code, PetscInt sense[], P
 
 /* A motion is unconstrained if it is tangential for any choice of normals: an error of the normals must not make a
    motion resisted. alike: the largest space of a single choice, whose motions are free together. */
-static PetscErrorCode Search(const Shapes *s, PetscInt *n_unconstrained, PetscReal unconstrained[], PetscInt *n_alike,
-                             PetscReal alike[])
+static PetscErrorCode FreeMotionSearch(const Shapes *s, PetscInt *n_unconstrained, PetscReal unconstrained[],
+                                       PetscInt *n_alike, PetscReal alike[])
 {
   const PetscInt n_contacts = s->fe->scene->n_contacts, k = s->k;
   PetscInt codes = 1, *sense;
@@ -358,16 +358,16 @@ static PetscErrorCode Search(const Shapes *s, PetscInt *n_unconstrained, PetscRe
     PetscBool possible;
     PetscInt n = 0, before = 0;
 
-    PetscCall(Senses(s, code, sense, &possible));
+    PetscCall(FreeMotionSenses(s, code, sense, &possible));
     if (!possible) continue;
-    PetscCall(Null(s, sense, z, &n));
+    PetscCall(FreeMotionNull(s, sense, z, &n));
     /* Kept apart from the union: motions of different choices need not be free together. */
     if (n > *n_alike) {
       *n_alike = 0;
-      for (PetscInt a = 0; a < n; a++) Join(k, z + a * k, alike, n_alike);
+      for (PetscInt a = 0; a < n; a++) FreeMotionJoin(k, z + a * k, alike, n_alike);
     }
     before = *n_unconstrained;
-    for (PetscInt a = 0; a < n; a++) Join(k, z + a * k, unconstrained, n_unconstrained);
+    for (PetscInt a = 0; a < n; a++) FreeMotionJoin(k, z + a * k, unconstrained, n_unconstrained);
     /* No further motion can be found. */
     if (before == k) break;
   }
@@ -376,8 +376,8 @@ static PetscErrorCode Search(const Shapes *s, PetscInt *n_unconstrained, PetscRe
 }
 
 /* Component of a combination's rigid motions: first the rotations of each part, then the translations. Columns of
-   the elimination in Reduce(). */
-static PetscReal Entry(const HycoMotions *motions, const PetscReal z[], PetscInt dim, PetscInt column)
+   the elimination in FreeMotionReduce(). */
+static PetscReal FreeMotionEntry(const HycoMotions *motions, const PetscReal z[], PetscInt dim, PetscInt column)
 {
   const PetscInt k = motions->n, turns = dim == 1 ? 0 : dim == 2 ? 1 : 3;
   const PetscBool turn = (PetscBool)(column < k * turns);
@@ -397,19 +397,19 @@ static PetscReal Entry(const HycoMotions *motions, const PetscReal z[], PetscInt
 
 /* Changes the basis of the combinations for their names: with as many pure translations as possible. Gaussian
    elimination, rotations first: what remains after them are translations. */
-static void Reduce(const HycoMotions *motions, PetscInt dim, PetscInt n, PetscReal z[])
+static void FreeMotionReduce(const HycoMotions *motions, PetscInt dim, PetscInt n, PetscReal z[])
 {
   const PetscInt k = motions->n, columns = k * (dim == 1 ? 1 : dim == 2 ? 3 : 6), turns = columns - k * dim;
   PetscReal scale = 0;
 
   for (PetscInt c = 0; c < columns; c++) {
-    for (PetscInt r = 0; r < n; r++) scale = PetscMax(scale, PetscAbsReal(Entry(motions, z + r * k, dim, c)));
+    for (PetscInt r = 0; r < n; r++) scale = PetscMax(scale, PetscAbsReal(FreeMotionEntry(motions, z + r * k, dim, c)));
   }
   for (PetscInt c = 0, done = 0; c < columns && done < n; c++) {
     PetscInt best = done;
 
     /* keep the first suitable one */
-    while (best < n && PetscAbsReal(Entry(motions, z + best * k, dim, c)) < 1e-3 * scale) best++;
+    while (best < n && PetscAbsReal(FreeMotionEntry(motions, z + best * k, dim, c)) < 1e-3 * scale) best++;
     if (best == n) continue;
     for (PetscInt a = 0; a < k; a++) {
       const PetscReal swap = z[done * k + a];
@@ -419,7 +419,8 @@ static void Reduce(const HycoMotions *motions, PetscInt dim, PetscInt n, PetscRe
     }
     for (PetscInt r = c < turns ? 0 : done + 1; r < n; r++) { /* the translation of a rotation gives the position of
                                                                  its axis */
-      const PetscReal share = Entry(motions, z + r * k, dim, c) / Entry(motions, z + done * k, dim, c);
+      const PetscReal share =
+          FreeMotionEntry(motions, z + r * k, dim, c) / FreeMotionEntry(motions, z + done * k, dim, c);
 
       for (PetscInt a = 0; a < k && r != done; a++) z[r * k + a] -= share * z[done * k + a];
     }
@@ -428,8 +429,8 @@ static void Reduce(const HycoMotions *motions, PetscInt dim, PetscInt n, PetscRe
 }
 
 /* From the k rigid motions that supports leave, those that frictionless contact does not resist either: coefficients
-   (rows of k, orthonormal before Reduce()), freed by the caller. wide: a mesh with all facets around the nodes of
-   fe's contacts. Collective. */
+   (rows of k, orthonormal before FreeMotionReduce()), freed by the caller. wide: a mesh with all facets around the
+   nodes of fe's contacts. Collective. */
 PetscErrorCode HycoFEFindUnconstrained(MPI_Comm comm, HycoFE fe, HycoFE wide, const PetscInt index[], HycoPairs *pairs,
                                        const HycoMotions *motions, PetscInt *n_unconstrained, PetscReal **unconstrained,
                                        PetscInt *n_alike, PetscReal **alike)
@@ -447,10 +448,10 @@ PetscErrorCode HycoFEFindUnconstrained(MPI_Comm comm, HycoFE fe, HycoFE wide, co
   for (PetscInt t = 0; t < N_SENSES; t++)
     PetscCall(PetscCalloc3(3 * s.m, &s.normal[t], s.m, &s.doubt[t], s.m, &s.bend[t]));
   /* The relative displacement of slave and master by each motion, at each contact. */
-  Relative(&s, motions);
+  FreeMotionRelative(&s, motions);
   ierr = FindAllSenses(&s);
-  if (!ierr) ierr = Search(&s, n_unconstrained, *unconstrained, n_alike, *alike);
-  if (!ierr) Reduce(motions, fe->dim, *n_unconstrained, *unconstrained);
+  if (!ierr) ierr = FreeMotionSearch(&s, n_unconstrained, *unconstrained, n_alike, *alike);
+  if (!ierr) FreeMotionReduce(motions, fe->dim, *n_unconstrained, *unconstrained);
   for (PetscInt t = 0; t < N_SENSES; t++) PetscCall(PetscFree3(s.normal[t], s.doubt[t], s.bend[t]));
   PetscCall(PetscFree(s.d));
   PetscCall(ierr);

@@ -7,7 +7,7 @@
 #define SECTION "constant_"
 #define LONGEST 16384 /* characters of an expression after substitution */
 
-static const char *Name(HycoScene s, PetscInt c)
+static const char *ConstantsName(HycoScene s, PetscInt c)
 {
   return s->key[s->constant[c]] + strlen(SECTION);
 }
@@ -28,7 +28,8 @@ static PetscErrorCode CheckName(HycoScene s, const char key[], const char name[]
 
 /* Appends `text` with its constants substituted, in brackets. depth: nesting of constants, to detect cycles. A chain of
    constants that refers to no one twice is at most n_constants deep. out[] is one buffer for the whole recursion. */
-static PetscErrorCode Expand(HycoScene s, const char key[], const char text[], PetscInt depth, char out[LONGEST])
+static PetscErrorCode ConstantsExpand(HycoScene s, const char key[], const char text[], PetscInt depth,
+                                      char out[LONGEST])
 {
   size_t at = strlen(out);
 
@@ -40,7 +41,7 @@ static PetscErrorCode Expand(HycoScene s, const char key[], const char text[], P
     if (isalpha((unsigned char)*text) || *text == '_') {
       while (isalnum((unsigned char)text[n]) || text[n] == '_') n++;
       for (c = 0; c < s->n_constants; c++) {
-        if (strlen(Name(s, c)) == n && strncasecmp(Name(s, c), text, n) == 0) break;
+        if (strlen(ConstantsName(s, c)) == n && strncasecmp(ConstantsName(s, c), text, n) == 0) break;
       }
     } else if (isdigit((unsigned char)*text) || *text == '.') { /* the e5 of 1e5 is not a name */
       while (isalnum((unsigned char)text[n]) || text[n] == '.') n++;
@@ -50,9 +51,10 @@ static PetscErrorCode Expand(HycoScene s, const char key[], const char text[], P
               LONGEST);
     if (c < s->n_constants) {
       HycoCheck(depth < s->n_constants,
-                "%s: the constant %s refers to itself; definitions of constants must not be circular", key, Name(s, c));
+                "%s: the constant %s refers to itself; definitions of constants must not be circular", key,
+                ConstantsName(s, c));
       strcpy(out + at, "(");
-      PetscCall(Expand(s, key, s->value[s->constant[c]], depth + 1, out));
+      PetscCall(ConstantsExpand(s, key, s->value[s->constant[c]], depth + 1, out));
       at = strlen(out);
       out[at++] = ')';
     } else {
@@ -79,7 +81,7 @@ PetscErrorCode HycoSceneExpression(HycoScene s, const char key[], const char tex
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscCalloc1(LONGEST, &whole));
-  ierr = Expand(s, key, text, 0, whole);
+  ierr = ConstantsExpand(s, key, text, 0, whole);
   if (!ierr) ierr = HycoExprCreate(key, whole, s->n_variables, names, expr);
   PetscCall(PetscFree(whole));
   PetscCall(ierr);

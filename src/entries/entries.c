@@ -246,7 +246,7 @@ static PetscErrorCode ReadText(const char file[], char **text)
 }
 
 /* PETSc reads the file itself, unless it has nested lists. */
-static PetscErrorCode Insert(PetscOptions options, const char file[], char text[])
+static PetscErrorCode EntriesInsert(PetscOptions options, const char file[], char text[])
 {
   PetscFunctionBegin;
   if (text && HycoEntriesFlatten(text))
@@ -267,7 +267,7 @@ static PetscErrorCode ReadYAML(PetscOptions options, const char file[])
   HycoCheck(IsText(file), "%s is not valid YAML for hyco: it contains a zero byte, or cannot be read", file);
   PetscCall(ReadText(file, &text));
   HycoOnError(text ? HycoEntriesCheck(text, file) : PETSC_SUCCESS, PetscCall(PetscFree(text)));
-  HycoCatch(Insert(options, file, text), caught, message);
+  HycoCatch(EntriesInsert(options, file, text), caught, message);
   PetscCall(PetscFree(text));
   HycoCheck(!caught || !strstr(message, "max number of options"),
             "%s has more than 512 entries, the limit of this PETSc (%d.%d); combine entries into one expression, or "

@@ -27,7 +27,7 @@ PetscErrorCode HycoExprDestroy(HycoExpr *expr)
 }
 
 /* muParser reports errors through a handler that is not called by default; this reads and clears its flag. */
-static void Quiet(muParserHandle_t parser)
+static void ExprClearError(muParserHandle_t parser)
 {
   (void)parser;
 }
@@ -42,7 +42,7 @@ PetscBool HycoExprAlike(HycoExpr a, HycoExpr b)
 /* Only the two ends of a long expression are shown, so that a message has room for the reason. */
 #define SHORT 260
 /* Both ends of a long expression, for messages: the error is usually near one of them. */
-static void Shorten(const char text[], char out[SHORT])
+static void ExprShorten(const char text[], char out[SHORT])
 {
   const size_t n = strlen(text);
 
@@ -53,23 +53,23 @@ static void Shorten(const char text[], char out[SHORT])
 }
 
 /* muParser's own message says where it stopped; the entry says which of the many expressions it was. */
-static PetscErrorCode Raise(HycoExpr e)
+static PetscErrorCode ExprReportError(HycoExpr e)
 {
   char text[SHORT];
 
   PetscFunctionBegin;
-  Shorten(e->text, text);
+  ExprShorten(e->text, text);
   HycoFail("%s: \"%s\" is not an expression: %.300s", e->key, text, mupGetErrorMsg(e->parser));
 }
 
-/* Which variables an expression uses, found by the addresses that the parser was given: what does not depend on a parameter
-   is computed once. An unknown name is refused here, with the known ones. */
+/* Which variables an expression uses, found by the addresses that the parser was given: what does not depend on a
+   parameter is computed once. An unknown name is refused here, with the known ones. */
 static PetscErrorCode FindVariables(HycoExpr e, PetscInt n, const char *const names[])
 {
   int n_used = mupGetExprVarNum(e->parser);
 
   PetscFunctionBegin;
-  if (mupError(e->parser)) PetscCall(Raise(e));
+  if (mupError(e->parser)) PetscCall(ExprReportError(e));
   for (int k = 0; k < n_used; k++) {
     const char *name = NULL;
     double *address = NULL;
@@ -86,7 +86,7 @@ static PetscErrorCode FindVariables(HycoExpr e, PetscInt n, const char *const na
       char list[HYCO_LINE] = "x, y, z", text[SHORT];
 
       for (PetscInt p = 0; p < n; p++) PetscCall(HycoListAdd(list, ", ", names[p]));
-      Shorten(e->text, text);
+      ExprShorten(e->text, text);
       HycoFail("%s: \"%s\" uses %.100s, which is unknown; the known names are %s, pi", e->key, text, name, list);
     }
   }
@@ -107,13 +107,13 @@ static PetscErrorCode CheckNesting(HycoExpr e)
     depth += (*c == '(') - (*c == ')');
     most = PetscMax(most, depth);
   }
-  Shorten(e->text, text);
+  ExprShorten(e->text, text);
   HycoCheck(most <= DEEPEST, "%s: \"%s\" has %d brackets inside each other; at most %d are possible", e->key, text,
             (int)most, DEEPEST);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static double Modulo(double a, double b)
+static double ExprModulo(double a, double b)
 {
   return a - b * floor(a / b);
 }
@@ -125,7 +125,7 @@ static void DefineFunctions(HycoExpr e, PetscInt n, const char *const names[])
     const char *name;
     muFun1_t one;
     muFun2_t two;
-  } functions[] = {{"floor", floor, NULL}, {"ceil", ceil, NULL}, {"mod", NULL, Modulo}, {"hypot", NULL, hypot}};
+  } functions[] = {{"floor", floor, NULL}, {"ceil", ceil, NULL}, {"mod", NULL, ExprModulo}, {"hypot", NULL, hypot}};
 
   for (size_t k = 0; k < sizeof(functions) / sizeof(functions[0]); k++) {
     PetscInt p = 0;
@@ -139,9 +139,9 @@ static void DefineFunctions(HycoExpr e, PetscInt n, const char *const names[])
   }
 }
 
-/* A plain number does not need a parser. Variables are defined before the text is set, and the text is evaluated once, since
-   muParser reports some errors only then. */
-static PetscErrorCode Parse(HycoExpr e, PetscInt n, const char *const names[])
+/* A plain number does not need a parser. Variables are defined before the text is set, and the text is evaluated once,
+   since muParser reports some errors only then. */
+static PetscErrorCode ExprParse(HycoExpr e, PetscInt n, const char *const names[])
 {
   static const char *const axis[3] = {"x", "y", "z"};
   char *end;
@@ -155,7 +155,7 @@ static PetscErrorCode Parse(HycoExpr e, PetscInt n, const char *const names[])
   HycoCheck(e->text[strspn(e->text, " \t")] != '\0', "%s is empty; give a number or an expression", e->key);
   PetscCall(CheckNesting(e));
   e->parser = mupCreate(muBASETYPE_FLOAT);
-  mupSetErrorHandler(e->parser, Quiet);
+  mupSetErrorHandler(e->parser, ExprClearError);
   mupDefineConst(e->parser, "pi", PETSC_PI); /* muParser's own _pi has 12 digits */
   DefineFunctions(e, n, names);
   for (int c = 0; c < 3; c++) mupDefineVar(e->parser, axis[c], &e->x[c]);
@@ -163,12 +163,12 @@ static PetscErrorCode Parse(HycoExpr e, PetscInt n, const char *const names[])
   for (PetscInt p = 0; p < n; p++)
     mupDefineVar(e->parser, names[p], &e->mu[p]); /* a parameter may have the name
                                                      temperature */
-  if (mupError(e->parser)) PetscCall(Raise(e));
+  if (mupError(e->parser)) PetscCall(ExprReportError(e));
   mupSetExpr(e->parser, e->text);
-  if (mupError(e->parser)) PetscCall(Raise(e));
+  if (mupError(e->parser)) PetscCall(ExprReportError(e));
   PetscCall(FindVariables(e, n, names));
   (void)mupEval(e->parser);
-  if (mupError(e->parser)) PetscCall(Raise(e));
+  if (mupError(e->parser)) PetscCall(ExprReportError(e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -180,7 +180,7 @@ PetscErrorCode HycoExprCreate(const char key[], const char text[], PetscInt n, c
   PetscCall(PetscNew(expr));
   PetscCall(PetscStrallocpy(key, &(*expr)->key));
   PetscCall(PetscStrallocpy(text, &(*expr)->text));
-  HycoOnError(Parse(*expr, n, names), PetscCall(HycoExprDestroy(expr)));
+  HycoOnError(ExprParse(*expr, n, names), PetscCall(HycoExprDestroy(expr)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -232,7 +232,7 @@ PetscErrorCode HycoExprEvalHot(HycoExpr e, const PetscReal mu[], PetscInt n, con
         value[k] = value[0];
       }
     }
-    if (mupError(e->parser)) PetscCall(Raise(e));
+    if (mupError(e->parser)) PetscCall(ExprReportError(e));
   }
   for (PetscInt k = 0; k < n; k++) {
     if (PetscIsInfOrNanReal(value[k])) {
@@ -240,7 +240,7 @@ PetscErrorCode HycoExprEvalHot(HycoExpr e, const PetscReal mu[], PetscInt n, con
 
       /* With the place and the parameters, since a division by zero may occur at one point of one sample alone. */
       PetscCall(HycoExprPlace(e, mu, xyz + 3 * k, place));
-      Shorten(e->text, text);
+      ExprShorten(e->text, text);
       HycoFail("%s: \"%s\" is not finite at %s", e->key, text, place);
     }
   }
@@ -263,7 +263,7 @@ PetscErrorCode HycoExprRefuseHeat(HycoExpr e)
   char text[SHORT];
 
   PetscFunctionBegin;
-  Shorten(e->text, text);
+  ExprShorten(e->text, text);
   HycoCheck(!e->in_heat, "%s: \"%s\" uses temperature, which is allowed only in a law's constants and in expansion",
             e->key, text);
   PetscFunctionReturn(PETSC_SUCCESS);

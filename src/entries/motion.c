@@ -3,7 +3,7 @@
 #include <string.h>
 
 /* The expression of an entry. */
-static HycoExpr *Find(HycoScene s, const char key[])
+static HycoExpr *MotionEntryFind(HycoScene s, const char key[])
 {
   HycoMotion *m = &s->motion;
   static const char *const vectors[] = {"gravity_", "rotation_axis_", "rotation_through_"};
@@ -26,7 +26,7 @@ static HycoExpr *Find(HycoScene s, const char key[])
 PetscErrorCode HycoSceneReadMotion(HycoScene s, PetscInt entry)
 {
   const char *key = s->key[entry];
-  HycoExpr *expr = Find(s, key);
+  HycoExpr *expr = MotionEntryFind(s, key);
 
   PetscFunctionBegin;
   HycoCheck(expr,
@@ -42,7 +42,7 @@ PetscErrorCode HycoSceneReadMotion(HycoScene s, PetscInt entry)
 
 /* All expressions in order; NULL: not given in the scene. */
 #define N_EXPR 10
-static HycoExpr *At(HycoScene s, PetscInt k)
+static HycoExpr *MotionAt(HycoScene s, PetscInt k)
 {
   HycoMotion *m = &s->motion;
 
@@ -58,7 +58,7 @@ PetscBool HycoSceneHasInertia(HycoScene s, const HycoBody *body, const PetscBool
 
   if (!body->density || !(m->gravity[0] || m->gravity[1] || m->gravity[2] || m->speed)) return PETSC_FALSE;
   if (!changed) return PETSC_TRUE;
-  for (PetscInt k = 0; k < N_EXPR; k++) changes = (PetscBool)(changes || HycoExprChanges(*At(s, k), changed));
+  for (PetscInt k = 0; k < N_EXPR; k++) changes = (PetscBool)(changes || HycoExprChanges(*MotionAt(s, k), changed));
   return (PetscBool)(changes || HycoExprChanges(body->density, changed));
 }
 
@@ -71,8 +71,8 @@ PetscErrorCode HycoSceneCheckMotion(HycoScene s)
   PetscFunctionBegin;
   for (PetscInt b = 0; b < s->n_bodies; b++) density = (PetscBool)(density || s->body[b].density);
   for (PetscInt k = 0; k < N_EXPR; k++) {
-    if (*At(s, k)) given = HycoExprKey(*At(s, k));
-    if (*At(s, k) && k > 3) place = HycoExprKey(*At(s, k));
+    if (*MotionAt(s, k)) given = HycoExprKey(*MotionAt(s, k));
+    if (*MotionAt(s, k) && k > 3) place = HycoExprKey(*MotionAt(s, k));
   }
   HycoCheck(!given || density, "%s needs a density, and no body has one; write body: NAME: {density: ...}", given);
   HycoCheck(!place || s->motion.speed,
@@ -83,6 +83,6 @@ PetscErrorCode HycoSceneCheckMotion(HycoScene s)
 PetscErrorCode HycoSceneDestroyMotion(HycoScene s)
 {
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < N_EXPR; k++) PetscCall(HycoExprDestroy(At(s, k)));
+  for (PetscInt k = 0; k < N_EXPR; k++) PetscCall(HycoExprDestroy(MotionAt(s, k)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -16,7 +16,7 @@ static char *SkipQuoted(char *c)
 
 /* Whether a scalar, a list or a mapping may begin here: after a separator and blanks. Elsewhere brackets and
    quotes are part of a plain scalar. */
-static PetscBool Begins(const char text[], const char *c)
+static PetscBool NestedPrefixLength(const char text[], const char *c)
 {
   while (c > text && (c[-1] == ' ' || c[-1] == '\t')) c--;
   return (PetscBool)(c == text || strchr(":,[{-\n", c[-1]));
@@ -41,9 +41,9 @@ PetscBool HycoEntriesFlatten(char text[])
     if (*c == '\n') line = c + 1;
     if (*c == '#' && (c == text || strchr(" \t\n", c[-1]))) {
       c += strcspn(c, "\n");
-    } else if ((*c == '"' || *c == '\'') && Begins(text, c)) {
+    } else if ((*c == '"' || *c == '\'') && NestedPrefixLength(text, c)) {
       c = SkipQuoted(c);
-    } else if (*c == '[' && (depth || Begins(text, c))) {
+    } else if (*c == '[' && (depth || NestedPrefixLength(text, c))) {
       /* treated as if the list around it had brackets */
       if (!depth && IsItem(line)) depth = 1;
       if (++depth == 2) {

@@ -20,7 +20,7 @@ static int LineAt(const char text[], size_t at)
 
 /* What is wrong, after the parser has stopped. Also where the open bracket or quote began, which is often the real
    mistake. */
-static void Describe(const yaml_parser_t *p, const char text[], char problem[HYCO_LINE])
+static void YamlDescribe(const yaml_parser_t *p, const char text[], char problem[HYCO_LINE])
 {
   const PetscBool bytes = (PetscBool)(p->error == YAML_READER_ERROR);
   const int line = bytes ? LineAt(text, p->problem_offset) : (int)p->problem_mark.line + 1;
@@ -32,7 +32,7 @@ static void Describe(const yaml_parser_t *p, const char text[], char problem[HYC
 }
 
 /* What an event does not allow; depth: of open lists and mappings. */
-static void Refuse(const yaml_event_t *event, int depth, int documents, char problem[HYCO_LINE])
+static void YamlRefuse(const yaml_event_t *event, int depth, int documents, char problem[HYCO_LINE])
 {
   const int line = (int)event->start_mark.line + 1;
 
@@ -42,7 +42,7 @@ static void Refuse(const yaml_event_t *event, int depth, int documents, char pro
     snprintf(problem, HYCO_LINE, "line %d: a second document begins; remove this line", line);
 }
 
-static PetscBool Begin(yaml_parser_t *parser, const char text[])
+static PetscBool YamlBegin(yaml_parser_t *parser, const char text[])
 {
   if (!yaml_parser_initialize(parser)) return PETSC_FALSE;
   yaml_parser_set_input_string(parser, (const unsigned char *)text, strlen(text));
@@ -58,14 +58,14 @@ static void CheckEvents(yaml_parser_t *parser, const char text[], char problem[H
 
   while (more && !problem[0]) {
     if (!yaml_parser_parse(parser, &event)) {
-      Describe(parser, text, problem);
+      YamlDescribe(parser, text, problem);
       return;
     }
     more = (PetscBool)(event.type != YAML_STREAM_END_EVENT);
     documents += event.type == YAML_DOCUMENT_START_EVENT;
     depth += event.type == YAML_MAPPING_START_EVENT || event.type == YAML_SEQUENCE_START_EVENT;
     depth -= event.type == YAML_MAPPING_END_EVENT || event.type == YAML_SEQUENCE_END_EVENT;
-    Refuse(&event, depth, documents, problem);
+    YamlRefuse(&event, depth, documents, problem);
     yaml_event_delete(&event);
   }
 }
@@ -78,15 +78,15 @@ PetscBool HycoYAMLHasProblem(const char text[], char problem[HYCO_LINE])
   yaml_document_t document;
 
   problem[0] = '\0';
-  if (Begin(&parser, text)) {
+  if (YamlBegin(&parser, text)) {
     CheckEvents(&parser, text, problem);
     yaml_parser_delete(&parser);
   }
-  if (!problem[0] && Begin(&parser, text)) { /* aliases that are not defined */
+  if (!problem[0] && YamlBegin(&parser, text)) { /* aliases that are not defined */
     if (yaml_parser_load(&parser, &document))
       yaml_document_delete(&document);
     else
-      Describe(&parser, text, problem);
+      YamlDescribe(&parser, text, problem);
     yaml_parser_delete(&parser);
   }
   return (PetscBool)(problem[0] != '\0');
@@ -221,7 +221,7 @@ PetscErrorCode HycoEntriesCheck(const char text[], const char file[])
 
   PetscFunctionBegin;
   HycoCheck(!HycoYAMLHasProblem(text, problem), "%s is not valid YAML for hyco: %s", file, problem);
-  PetscCheck(Begin(&parser, text), PETSC_COMM_SELF, PETSC_ERR_MEM, "libyaml has no memory");
+  PetscCheck(YamlBegin(&parser, text), PETSC_COMM_SELF, PETSC_ERR_MEM, "libyaml has no memory");
   ierr = ScanAll(&s, &parser);
   yaml_parser_delete(&parser);
   for (PetscInt k = 0; k < s.n; k++) PetscCall(PetscFree(s.key[k]));

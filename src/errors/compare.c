@@ -8,7 +8,7 @@ typedef struct {
 } Norms;
 
 /* lost2 and size2 are sums of squares, lost and size maxima. */
-static void Add(Norms *n, PetscReal value, PetscReal reference)
+static void CompareAdd(Norms *n, PetscReal value, PetscReal reference)
 {
   n->lost2 += (value - reference) * (value - reference);
   n->size2 += reference * reference;
@@ -16,9 +16,9 @@ static void Add(Norms *n, PetscReal value, PetscReal reference)
   n->size = PetscMax(n->size, PetscAbsReal(reference));
 }
 
-/* What round-off leaves of the stresses of cell e: that of the strains of its displacements, which a rigid motion may make
-   large, times the modulus; of a path the round-off of its steps adds up. */
-static PetscReal Rounding(HycoROM m, PetscInt e, const PetscReal u[], PetscReal least)
+/* What round-off leaves of the stresses of cell e: that of the strains of its displacements, which a rigid motion may
+   make large, times the modulus; of a path the round-off of its steps adds up. */
+static PetscReal CompareRoundOff(HycoROM m, PetscInt e, const PetscReal u[], PetscReal least)
 {
   const HycoMesh mesh = m->model->mesh;
   const PetscReal *tangent = m->fe->tangent + m->fe->tangent_start[e];
@@ -41,7 +41,7 @@ static PetscReal Rounding(HycoROM m, PetscInt e, const PetscReal u[], PetscReal 
    contacts, also of those outside the RID, which are reconstructed. NULL sigma or inelastic: not compared. Differences
    and sizes, not quotients: a path divides them by its own largest sizes. */
 PetscErrorCode HycoROMMeasureRID(HycoROM m, const PetscReal u[], const PetscReal sigma[], const PetscReal inelastic[],
-                                 const PetscReal lambda[], HycoLost lost[])
+                                 const PetscReal lambda[], HycoErrorNorm lost[])
 {
   const PetscReal *stress, *flow = NULL;
   const PetscInt dim = m->model->mesh->dim, ns = m->fe->n_sigma, *node;
@@ -55,7 +55,7 @@ PetscErrorCode HycoROMMeasureRID(HycoROM m, const PetscReal u[], const PetscReal
   for (PetscInt k = 0; k < n_nodes * dim; k++) {
     const PetscInt i = node[k / dim] * dim + k % dim;
 
-    Add(&rid, m->U[i], u[i]);
+    CompareAdd(&rid, m->U[i], u[i]);
   }
   PetscCall(ISRestoreIndices(m->model->rid, &node));
   /* Against 0, of which no share tells round-off: by the size of the mesh. */
@@ -65,24 +65,24 @@ PetscErrorCode HycoROMMeasureRID(HycoROM m, const PetscReal u[], const PetscReal
     rid.lost = 0;
   PetscCall(HycoROMGetRID(m, NULL, NULL, NULL, NULL, NULL, &stress));
   for (PetscInt k = 0; sigma && k < m->model->mesh->n_cells * ns; k++) {
-    Add(&s, stress[k], sigma[k]);
-    if (k % ns == 0) Add(&s11, stress[k], sigma[k]);
-    noise += PetscSqr(Rounding(m, k / ns, m->U, length));
+    CompareAdd(&s, stress[k], sigma[k]);
+    if (k % ns == 0) CompareAdd(&s11, stress[k], sigma[k]);
+    noise += PetscSqr(CompareRoundOff(m, k / ns, m->U, length));
   }
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
-    Add(&l, m->Lambda[k], lambda[k]);
-    if (m->model->in_rid[k]) Add(&lr, m->Lambda[k], lambda[k]);
+    CompareAdd(&l, m->Lambda[k], lambda[k]);
+    if (m->model->in_rid[k]) CompareAdd(&lr, m->Lambda[k], lambda[k]);
   }
   if (inelastic) PetscCall(HycoROMGetInelastic(m, NULL, &flow));
-  for (PetscInt k = 0; inelastic && k < m->model->mesh->n_cells; k++) Add(&p, flow[k], inelastic[k]);
-  lost[HYCO_ERROR_U_RID] = (HycoLost){rid.lost, rid.size};
+  for (PetscInt k = 0; inelastic && k < m->model->mesh->n_cells; k++) CompareAdd(&p, flow[k], inelastic[k]);
+  lost[HYCO_ERROR_U_RID] = (HycoErrorNorm){rid.lost, rid.size};
   noise = PetscSqrtReal(noise);
-  lost[HYCO_ERROR_SIGMA] = (HycoLost){PetscMax(PetscSqrtReal(s.lost2) - noise, 0), PetscSqrtReal(s.size2)};
+  lost[HYCO_ERROR_SIGMA] = (HycoErrorNorm){PetscMax(PetscSqrtReal(s.lost2) - noise, 0), PetscSqrtReal(s.size2)};
   /* Where this component vanishes, its difference is the round-off of the others. */
-  lost[HYCO_ERROR_SIGMA_11] = (HycoLost){s11.lost <= 1e-12 * s.size ? 0 : PetscMax(s11.lost - noise, 0), s11.size};
-  lost[HYCO_ERROR_LAMBDA] = (HycoLost){PetscSqrtReal(l.lost2), PetscSqrtReal(l.size2)};
-  lost[HYCO_ERROR_LAMBDA_RID] = (HycoLost){PetscSqrtReal(lr.lost2), PetscSqrtReal(lr.size2)};
-  lost[HYCO_ERROR_INELASTIC] = (HycoLost){PetscSqrtReal(p.lost2), PetscSqrtReal(p.size2)};
+  lost[HYCO_ERROR_SIGMA_11] = (HycoErrorNorm){s11.lost <= 1e-12 * s.size ? 0 : PetscMax(s11.lost - noise, 0), s11.size};
+  lost[HYCO_ERROR_LAMBDA] = (HycoErrorNorm){PetscSqrtReal(l.lost2), PetscSqrtReal(l.size2)};
+  lost[HYCO_ERROR_LAMBDA_RID] = (HycoErrorNorm){PetscSqrtReal(lr.lost2), PetscSqrtReal(lr.size2)};
+  lost[HYCO_ERROR_INELASTIC] = (HycoErrorNorm){PetscSqrtReal(p.lost2), PetscSqrtReal(p.size2)};
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -90,8 +90,8 @@ PetscErrorCode HycoROMMeasureRID(HycoROM m, const PetscReal u[], const PetscReal
 PetscErrorCode HycoROMCompareRID(HycoROM m, const PetscReal u[], const PetscReal sigma[], const PetscReal lambda[],
                                  HycoErrors *e, HycoForceErrors *forces)
 {
-  HycoLost lost[HYCO_N_ERRORS] = {{0}};
-  const HycoLost *l = &lost[HYCO_ERROR_LAMBDA], *lr = &lost[HYCO_ERROR_LAMBDA_RID];
+  HycoErrorNorm lost[HYCO_N_ERRORS] = {{0}};
+  const HycoErrorNorm *l = &lost[HYCO_ERROR_LAMBDA], *lr = &lost[HYCO_ERROR_LAMBDA_RID];
 
   PetscFunctionBegin;
   PetscCall(HycoROMMeasureRID(m, u, sigma, NULL, lambda, lost));
@@ -153,7 +153,7 @@ static PetscErrorCode ReadModes(HycoCompared k, const char path[])
 
 /* Only rank 0 has the model; every rank reads its own rows of the modes from the file, so that none has them all. For
    all comparisons with this model. */
-static PetscErrorCode Fill(HycoROM m, HycoFOM f, HycoCompared k)
+static PetscErrorCode CompareFill(HycoROM m, HycoFOM f, HycoCompared k)
 {
   char path[PETSC_MAX_PATH_LEN] = "";
 
@@ -168,7 +168,7 @@ static PetscErrorCode Fill(HycoROM m, HycoFOM f, HycoCompared k)
 
 /* Those for this model. Collective. Compared by the id, because a new model may have the address of a destroyed
    one. Reading the modes and the norm's factor takes longer than a comparison. */
-static PetscErrorCode Keep(HycoROM m, HycoFOM f, HycoCompared *k)
+static PetscErrorCode CompareKeep(HycoROM m, HycoFOM f, HycoCompared *k)
 {
   PetscObjectId id = 0;
   PetscContainer container;
@@ -189,7 +189,7 @@ static PetscErrorCode Keep(HycoROM m, HycoFOM f, HycoCompared *k)
   PetscCall(PetscContainerCreate(PETSC_COMM_SELF, &container));
   PetscCall(PetscContainerSetPointer(container, *k));
   PetscCall(PetscContainerSetCtxDestroy(container, DestroyCompared));
-  ierr = Fill(m, f, *k);
+  ierr = CompareFill(m, f, *k);
   if (!ierr) ierr = PetscObjectCompose((PetscObject)f, COMPARED, (PetscObject)container);
   PetscCall(PetscContainerDestroy(&container));
   PetscCall(ierr);
@@ -197,7 +197,7 @@ static PetscErrorCode Keep(HycoROM m, HycoFOM f, HycoCompared *k)
 }
 
 /* Rank 0. The same number of nodes and cells is taken for the same mesh. */
-static PetscErrorCode Check(HycoROM m, HycoFOM f)
+static PetscErrorCode CompareCheck(HycoROM m, HycoFOM f)
 {
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
@@ -242,8 +242,8 @@ PetscErrorCode HycoROMCompare(HycoROM m, HycoFOM f, HycoErrors *e)
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   HycoCheckGiven(e);
   PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoROMCompare()");
-  HycoOnRoot(HycoComm(f), Check(m, f));
-  PetscCall(Keep(m, f, &k));
+  HycoOnRoot(HycoComm(f), CompareCheck(m, f));
+  PetscCall(CompareKeep(m, f, &k));
   PetscCall(HycoFOMStress(f));
   PetscCall(HycoFOMGetLambda(f, &lambda));
   /* In the order of the file, of which each rank has a block. */

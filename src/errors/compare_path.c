@@ -4,7 +4,7 @@
 
 /* Each kind of error at its worst time and at the end. Relative to at least HYCO_SMALL_FORCE of the path's largest
    value: at times without load the relative error of a value near 0 would be large and mean nothing. */
-void HycoPathErrorsJudge(PetscInt n, const HycoLost lost[], HycoPathErrors *e)
+void HycoPathErrorsJudge(PetscInt n, const HycoErrorNorm lost[], HycoPathErrors *e)
 {
   const HycoPathErrors none = {.n = n};
 
@@ -14,7 +14,7 @@ void HycoPathErrorsJudge(PetscInt n, const HycoLost lost[], HycoPathErrors *e)
 
     for (PetscInt k = 0; k < n; k++) size = PetscMax(size, lost[k * HYCO_N_ERRORS + j].size);
     for (PetscInt k = 0; k < n; k++) {
-      const HycoLost *here = &lost[k * HYCO_N_ERRORS + j];
+      const HycoErrorNorm *here = &lost[k * HYCO_N_ERRORS + j];
 
       e->end[j] = HycoRelative(here->lost, PetscMax(here->size, HYCO_SMALL_FORCE * size));
       /* Equal errors: the first time. After the loop e->end is that of the last one. */
@@ -28,7 +28,7 @@ void HycoPathErrorsJudge(PetscInt n, const HycoLost lost[], HycoPathErrors *e)
 }
 
 /* Of an arbitrary position there is no error: full order has chosen another one. */
-void HycoTraceForgive(HycoROM m, PetscInt step, HycoLost lost[])
+void HycoTraceExcludeDisplacements(HycoROM m, PetscInt step, HycoErrorNorm lost[])
 {
   if (m->trace.loose[step]) lost[HYCO_ERROR_U].lost = lost[HYCO_ERROR_U_RID].lost = 0;
 }
@@ -39,7 +39,7 @@ typedef struct {
   PetscReal *value; /* for each time u, sigma, inelastic, lambda */
 } Kept;
 
-static PetscReal *At(const Kept *kept, PetscInt k)
+static PetscReal *ComparePathTime(const Kept *kept, PetscInt k)
 {
   return kept->value + (size_t)k * (size_t)(kept->n_dof + kept->n_sigma + kept->n_cells + kept->n_contacts);
 }
@@ -47,12 +47,12 @@ static PetscReal *At(const Kept *kept, PetscInt k)
 /* A HycoStepMonitor. HycoFOMGetSolution() gathers on rank 0 and is collective; the inelastic strains are of this rank's
    cells and are sent by the file's order. Full order's fields at all listed times, since the reduced path is predicted
    only when it has ended. */
-static PetscErrorCode Keep(HycoFOM f, const HycoStep *step, void *ctx)
+static PetscErrorCode ComparePathKeep(HycoFOM f, const HycoStep *step, void *ctx)
 {
   Kept *kept = (Kept *)ctx;
   const PetscReal *u, *sigma, *lambda;
   /* Only rank 0 allocated the room. */
-  PetscReal *to = f->rank ? NULL : At(kept, step->index), *mine;
+  PetscReal *to = f->rank ? NULL : ComparePathTime(kept, step->index), *mine;
   HycoFileOrder *all;
 
   PetscFunctionBegin;
@@ -78,10 +78,10 @@ static PetscErrorCode Keep(HycoFOM f, const HycoStep *step, void *ctx)
 
 /* The errors of the model at listed time k: U on the whole mesh, the others on the RID and the contacts. From the
    whole mesh's fields to those of the RID by its maps node_whole and cell_whole. */
-static PetscErrorCode Measure(HycoROM m, const Kept *kept, PetscInt k, HycoLost lost[])
+static PetscErrorCode ComparePathMeasure(HycoROM m, const Kept *kept, PetscInt k, HycoErrorNorm lost[])
 {
   const PetscInt dim = m->model->mesh->dim, ns = m->fe->n_sigma;
-  const PetscReal *u = At(kept, k), *sigma = u + kept->n_dof, *inelastic = sigma + kept->n_sigma,
+  const PetscReal *u = ComparePathTime(kept, k), *sigma = u + kept->n_dof, *inelastic = sigma + kept->n_sigma,
                   *lambda = inelastic + kept->n_cells, *found;
   PetscReal *u_rid, *sigma_rid, *inelastic_rid, square[2] = {0, 0};
 
@@ -102,22 +102,22 @@ static PetscErrorCode Measure(HycoROM m, const Kept *kept, PetscInt k, HycoLost 
     inelastic_rid[e] = inelastic[m->model->mesh->cell_whole[e]];
   }
   PetscCall(HycoROMMeasureRID(m, u_rid, sigma_rid, inelastic_rid, lambda, lost));
-  lost[HYCO_ERROR_U] = (HycoLost){PetscSqrtReal(square[0]), PetscSqrtReal(square[1])};
-  HycoTraceForgive(m, k, lost);
+  lost[HYCO_ERROR_U] = (HycoErrorNorm){PetscSqrtReal(square[0]), PetscSqrtReal(square[1])};
+  HycoTraceExcludeDisplacements(m, k, lost);
   PetscCall(PetscFree3(u_rid, sigma_rid, inelastic_rid));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Predicts in the same steps, and computes the errors. Rank 0. */
-static PetscErrorCode Compare(HycoROM m, PetscInt n, const PetscReal mu[], const HycoHistory *h, Kept *kept,
-                              HycoPathErrors *e)
+static PetscErrorCode ComparePathErrors(HycoROM m, PetscInt n, const PetscReal mu[], const HycoHistory *h, Kept *kept,
+                                        HycoPathErrors *e)
 {
   PetscInt reached;
-  HycoLost *lost;
+  HycoErrorNorm *lost;
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  /* Else At() would be read beyond its end. */
+  /* Else ComparePathTime() would be read beyond its end. */
   HycoCheck(m->model->whole_nodes * m->model->mesh->dim == kept->n_dof && m->model->whole_cells == kept->n_cells &&
                 m->model->pairs.n == kept->n_contacts,
             "the model was trained on a mesh of %d nodes and %d cells, and the scene's mesh has %d cells; compare on "
@@ -129,7 +129,7 @@ static PetscErrorCode Compare(HycoROM m, PetscInt n, const PetscReal mu[], const
   /* A prediction may end before the path does. */
   reached = PetscMin(kept->n, m->trace.n_listed);
   PetscCall(PetscMalloc1(reached * HYCO_N_ERRORS, &lost));
-  for (PetscInt k = 0; k < reached; k++) PetscCall(Measure(m, kept, k, lost + k * HYCO_N_ERRORS));
+  for (PetscInt k = 0; k < reached; k++) PetscCall(ComparePathMeasure(m, kept, k, lost + k * HYCO_N_ERRORS));
   HycoPathErrorsJudge(reached, lost, e);
   e->n_full = kept->n;
   PetscCall(PetscFree(lost));
@@ -137,14 +137,15 @@ static PetscErrorCode Compare(HycoROM m, PetscInt n, const PetscReal mu[], const
 }
 
 /* The path is solved, and kept on rank 0. Collective. A path that full order cannot follow is no reference. */
-static PetscErrorCode CompareKept(HycoROM m, HycoFOM f, PetscInt n, const PetscReal mu[], Kept *kept, HycoPathErrors *e)
+static PetscErrorCode CompareRowCache(HycoROM m, HycoFOM f, PetscInt n, const PetscReal mu[], Kept *kept,
+                                      HycoPathErrors *e)
 {
   HycoHistory h;
 
   PetscFunctionBegin;
   PetscCall(HycoFOMGetHistory(f, &h));
   HycoCheck(h.ended, "the full-order path ends at t = %.10g: %s; no comparison is possible", (double)h.t, h.why);
-  HycoOnRoot(HycoComm(f), Compare(m, n, mu, &h, kept, e));
+  HycoOnRoot(HycoComm(f), ComparePathErrors(m, n, mu, &h, kept, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -165,11 +166,11 @@ PetscErrorCode HycoROMComparePath(HycoROM m, HycoFOM f, PetscInt n, const PetscR
     PetscCall(PetscMalloc1((size_t)(kept.n_dof + kept.n_sigma + kept.n_cells + kept.n_contacts) *
                                (size_t)(f->scene->n_times + 1),
                            &kept.value));
-  PetscCall(HycoFOMSetStepMonitor(f, Keep, &kept));
+  PetscCall(HycoFOMSetStepMonitor(f, ComparePathKeep, &kept));
   ierr = HycoFOMSolve(f, n, mu);
   /* The monitor is removed first, on success and failure, as `kept` is on this stack. */
   PetscCall(HycoFOMSetStepMonitor(f, NULL, NULL));
-  if (!ierr) ierr = CompareKept(m, f, n, mu, &kept, e);
+  if (!ierr) ierr = CompareRowCache(m, f, n, mu, &kept, e);
   PetscCall(PetscFree(kept.value));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -65,7 +65,7 @@ PetscErrorCode HycoComparisonBring(HycoComparison *c)
 }
 
 /* Completes displacements by supports along a direction and ties, on the ranks' parts. */
-static PetscErrorCode Complete(HycoComparison *c)
+static PetscErrorCode ComparisonComplete(HycoComparison *c)
 {
   HycoFE fe = c->f->fe;
   PetscReal *u;
@@ -106,7 +106,7 @@ PetscErrorCode HycoComparisonPredict(HycoComparison *c, HycoROM m, PetscMPIInt o
   for (PetscInt k = 0; k < c->n_fe; k++) {
     if (c->fe_dof[k] >= first && c->fe_dof[k] < first + n) c->U[c->fe_dof[k] - first] = c->coefficient[c->l + k];
   }
-  PetscCall(Complete(c));
+  PetscCall(ComparisonComplete(c));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -67,7 +67,7 @@ PetscErrorCode HycoNormsDestroy(HycoNorms *norms)
 }
 
 /* sqrt(x.y). Round-off can make a square of 0 slightly negative. */
-static PetscErrorCode Root(HycoNorms h, PetscReal *norm)
+static PetscErrorCode NormRoot(HycoNorms h, PetscReal *norm)
 {
   PetscScalar square;
 
@@ -117,7 +117,7 @@ PetscErrorCode HycoNormH1(HycoNorms h, const PetscReal u[], const PetscReal minu
   PetscCall(SetFromRows(h, rows));
   PetscCall(PetscFree(rows));
   PetscCall(MatMult(h->H, h->x, h->y));
-  PetscCall(Root(h, norm));
+  PetscCall(NormRoot(h, norm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -171,6 +171,6 @@ PetscErrorCode HycoNormDual(HycoNorms h, HycoROM m, PetscBool rid_only, const Pe
   /* No force: a solve with a zero right-hand side is spared, on all ranks alike. */
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(KSPSolve(h->ksp, h->x, h->y));
-  PetscCall(Root(h, norm));
+  PetscCall(NormRoot(h, norm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

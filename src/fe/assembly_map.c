@@ -44,7 +44,7 @@ static PetscBool FindOffsets(HycoFE fe, const PetscInt ia[], const PetscInt ja[]
       const PetscInt row = FirstFree(fe, node[k / n]), col = FirstFree(fe, node[k % n]);
       PetscInt at = 0;
 
-      /* A pair without a free unknown is not used by Add(): any value does. */
+      /* A pair without a free unknown is not used by AssemblyMapAdd(): any value does. */
       *offset = 0;
       if (row < 0 || col < 0) continue;
       /* A linear search: rows have some tens of entries, and it is done once. */
@@ -57,8 +57,8 @@ static PetscBool FindOffsets(HycoFE fe, const PetscInt ia[], const PetscInt ja[]
 }
 
 /* Adds an element matrix, fixed unknowns reduced to their own diagonal. */
-static void Add(HycoFE fe, const PetscInt offset[], PetscInt cell, const PetscReal Ae[], const PetscInt ia[],
-                PetscScalar a[])
+static void AssemblyMapAdd(HycoFE fe, const PetscInt offset[], PetscInt cell, const PetscReal Ae[], const PetscInt ia[],
+                           PetscScalar a[])
 {
   PetscInt node[HYCO_MAX_CELL_NODES];
   const PetscInt dim = fe->dim, nv = HycoMeshCellNodes(fe->mesh, cell, node), n = nv * dim;
@@ -95,14 +95,15 @@ static PetscErrorCode AddCells(HycoFE fe, HycoAssemblyMap p, PetscBool constant,
     if (fe->constant[e] != constant) continue;
     PetscCall(HycoFEElementRoom(fe, e, &Ke));
     PetscCall(HycoFEElementStiffness(fe, e, Ke));
-    Add(fe, p->offset + p->start[e], e, Ke, ia, a);
+    AssemblyMapAdd(fe, p->offset + p->start[e], e, Ke, ia, a);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Leaves *places NULL if the pattern does not fit; the caller then assembles by MatSetValues(). Places in the matrix's
    array are looked up once: later assemblies add without any search for columns. */
-static PetscErrorCode Create(HycoFE fe, const PetscInt ia[], const PetscInt ja[], PetscInt n, HycoAssemblyMap *places)
+static PetscErrorCode AssemblyMapCreate(HycoFE fe, const PetscInt ia[], const PetscInt ja[], PetscInt n,
+                                        HycoAssemblyMap *places)
 {
   HycoAssemblyMap p;
   PetscInt node[HYCO_MAX_CELL_NODES];
@@ -153,7 +154,7 @@ PetscErrorCode HycoAssemblyMapAssemble(HycoFE fe, Mat K, PetscBool *done)
   PetscCall(MatGetRowIJ(K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &rows));
   if (fe->places && (fe->places->matrix != id || fe->places->pattern != pattern))
     PetscCall(HycoAssemblyMapDestroy(&fe->places));
-  if (!fe->places) PetscCall(Create(fe, ia, ja, n, &fe->places));
+  if (!fe->places) PetscCall(AssemblyMapCreate(fe, ia, ja, n, &fe->places));
   if (fe->places) {
     fe->places->matrix = id;
     fe->places->pattern = pattern;

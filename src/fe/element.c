@@ -10,7 +10,7 @@ static const PetscReal corner[8][3] = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-
 
 /* Products of linear functions on [-1, 1]^dim with two Gauss points in each direction. Two points integrate the
    stiffness of a parallelogram or parallelepiped exactly. */
-static void Tensor(HycoElement *e, PetscInt dim)
+static void ElementTensor(HycoElement *e, PetscInt dim)
 {
   const PetscReal g = 1 / PetscSqrtReal(3.0);
 
@@ -34,7 +34,7 @@ static void Tensor(HycoElement *e, PetscInt dim)
 }
 
 /* Barycentric functions on the unit simplex; points of degree 2 on the lines from the centre to the corners. */
-static void Simplex(HycoElement *e, PetscInt dim)
+static void ElementSimplex(HycoElement *e, PetscInt dim)
 {
   /* Barycentric coordinates of the points: one near its corner, the others far from theirs. */
   const PetscReal near = dim == 2 ? 2.0 / 3 : 0.58541019662496845446, far = dim == 2 ? 1.0 / 6 : 0.13819660112501051518;
@@ -51,13 +51,13 @@ static void Simplex(HycoElement *e, PetscInt dim)
 }
 
 /* Quadratic functions of one coordinate on [-1, 1]: 1 at `at` (-1, 0 or 1), 0 at the other two. */
-static PetscReal Quadratic(PetscInt at, PetscReal x)
+static PetscReal ElementQuadratic(PetscInt at, PetscReal x)
 {
   return at ? x * (x + at) / 2 : 1 - x * x;
 }
 
-/* The derivative of Quadratic(). */
-static PetscReal QuadraticSlope(PetscInt at, PetscReal x)
+/* The derivative of ElementQuadratic(). */
+static PetscReal QuadraticDerivative(PetscInt at, PetscReal x)
 {
   return at ? x + at / 2.0 : -2 * x;
 }
@@ -73,13 +73,13 @@ static const PetscInt node9[9][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}, {0, -1}
 static void LineAt(PetscReal x, PetscReal N[], PetscReal dN[][3])
 {
   for (PetscInt a = 0; a < 3; a++) {
-    N[a] = Quadratic(node3[a], x);
-    dN[a][0] = QuadraticSlope(node3[a], x);
+    N[a] = ElementQuadratic(node3[a], x);
+    dN[a][0] = QuadraticDerivative(node3[a], x);
   }
 }
 
 /* Tabulated at the Gauss points, or with unit weights at the nodes, which gives nodal normals. */
-static void Line3(HycoElement *e, PetscBool at_nodes)
+static void ElementLine3(HycoElement *e, PetscBool at_nodes)
 {
   e->dim = 1;
   e->nv = e->nq = 3;
@@ -100,15 +100,15 @@ static void QuadAt(PetscInt nv, PetscReal x, PetscReal y, PetscReal N[], PetscRe
     const PetscInt i = node9[a][0], j = node9[a][1];
     const PetscReal share = nv == 9 ? 0 : a < 4 ? -1.0 / 4 : 1.0 / 2; /* share of the middle's function in a quad8 */
 
-    N[a] = Quadratic(i, x) * Quadratic(j, y) + share * f[0];
-    dN[a][0] = QuadraticSlope(i, x) * Quadratic(j, y) + share * f[1];
-    dN[a][1] = Quadratic(i, x) * QuadraticSlope(j, y) + share * f[2];
+    N[a] = ElementQuadratic(i, x) * ElementQuadratic(j, y) + share * f[0];
+    dN[a][0] = QuadraticDerivative(i, x) * ElementQuadratic(j, y) + share * f[1];
+    dN[a][1] = ElementQuadratic(i, x) * QuadraticDerivative(j, y) + share * f[2];
   }
 }
 
 /* Quad8 and quad9 share their first eight nodes in gmsh's order. Three by three points, with which the mass of quad9 is
    exact as well; at_nodes: the functions at the nodes themselves. */
-static void Quad(HycoElement *e, PetscInt nv, PetscBool at_nodes)
+static void ElementQuad(HycoElement *e, PetscInt nv, PetscBool at_nodes)
 {
   e->dim = 2;
   e->nv = nv;
@@ -141,7 +141,7 @@ static void SimplexAt(PetscInt dim, PetscInt nv, const PetscReal L[4], PetscReal
 }
 
 /* Six points of degree 4 (G. R. Cowper, Int. J. Numer. Meth. Engng 7 (1973) 405-408). */
-static void Tri6(HycoElement *e, PetscBool at_nodes)
+static void ElementTri6(HycoElement *e, PetscBool at_nodes)
 {
   static const PetscReal near[2] = {0.816847572980458513080857, 0.108103018168070227363429},
                          weight[2] = {0.109951743655321867638326, 0.223381589678011465695007};
@@ -165,7 +165,7 @@ static void Tri6(HycoElement *e, PetscBool at_nodes)
 
 /* Fourteen points of degree 5, weights positive (N. J. Walkington, Quadrature on simplices of arbitrary dimension,
    Carnegie Mellon University (2000)): two orbits of four, one of six. */
-static void Tet10(HycoElement *e)
+static void ElementTet10(HycoElement *e)
 {
   static const PetscReal far[2] = {0.310885919263300609797, 0.0927352503108912264023},
                          weight[3] = {0.112687925718015850799, 0.0734930431163619495437, 0.0425460207770814664381},
@@ -219,13 +219,13 @@ static void ProductAt(const PetscInt r[3], const PetscReal x[3], PetscReal *N, P
 {
   PetscReal f[3];
 
-  for (PetscInt c = 0; c < 3; c++) f[c] = Quadratic(r[c], x[c]);
+  for (PetscInt c = 0; c < 3; c++) f[c] = ElementQuadratic(r[c], x[c]);
   *N = f[0] * f[1] * f[2];
-  for (PetscInt c = 0; c < 3; c++) dN[c] = QuadraticSlope(r[c], x[c]) * f[(c + 1) % 3] * f[(c + 2) % 3];
+  for (PetscInt c = 0; c < 3; c++) dN[c] = QuadraticDerivative(r[c], x[c]) * f[(c + 1) % 3] * f[(c + 2) % 3];
 }
 
 /* 27 Gauss points for both: either kind has terms of degree 2 in each coordinate. */
-static void Hex(HycoElement *e, PetscInt nv)
+static void ElementHex(HycoElement *e, PetscInt nv)
 {
   e->dim = 3;
   e->nv = nv;
@@ -241,23 +241,23 @@ static void Hex(HycoElement *e, PetscInt nv)
 }
 
 /* At the first use; constant afterwards. */
-static void Tabulate(void)
+static void ElementTabulate(void)
 {
-  Tensor(&table[HYCO_LINE2], 1);
-  Tensor(&table[HYCO_QUAD4], 2);
-  Tensor(&table[HYCO_HEX8], 3);
-  Simplex(&table[HYCO_TRI3], 2);
-  Simplex(&table[HYCO_TET4], 3);
-  Tri6(&table[HYCO_TRI6], PETSC_FALSE);
-  Quad(&table[HYCO_QUAD8], 8, PETSC_FALSE);
-  Quad(&table[HYCO_QUAD9], 9, PETSC_FALSE);
-  Tet10(&table[HYCO_TET10]);
-  Hex(&table[HYCO_HEX20], 20);
-  Hex(&table[HYCO_HEX27], 27);
-  Line3(&line3, PETSC_FALSE);
-  Line3(&line3_nodes, PETSC_TRUE);
-  Tri6(&tri6_nodes, PETSC_TRUE);
-  Quad(&quad9_nodes, 9, PETSC_TRUE);
+  ElementTensor(&table[HYCO_LINE2], 1);
+  ElementTensor(&table[HYCO_QUAD4], 2);
+  ElementTensor(&table[HYCO_HEX8], 3);
+  ElementSimplex(&table[HYCO_TRI3], 2);
+  ElementSimplex(&table[HYCO_TET4], 3);
+  ElementTri6(&table[HYCO_TRI6], PETSC_FALSE);
+  ElementQuad(&table[HYCO_QUAD8], 8, PETSC_FALSE);
+  ElementQuad(&table[HYCO_QUAD9], 9, PETSC_FALSE);
+  ElementTet10(&table[HYCO_TET10]);
+  ElementHex(&table[HYCO_HEX20], 20);
+  ElementHex(&table[HYCO_HEX27], 27);
+  ElementLine3(&line3, PETSC_FALSE);
+  ElementLine3(&line3_nodes, PETSC_TRUE);
+  ElementTri6(&tri6_nodes, PETSC_TRUE);
+  ElementQuad(&quad9_nodes, 9, PETSC_TRUE);
   /* A facet of a line: its area is 1. */
   point.nv = point.nq = 1;
   point.w[0] = point.N[0][0] = 1;
@@ -267,7 +267,7 @@ static void Tabulate(void)
 /* Valid for the process's life. The tables are made by the first call, which must not come from two threads at once. */
 const HycoElement *HycoElementGet(HycoCellType type)
 {
-  if (!ready) Tabulate();
+  if (!ready) ElementTabulate();
   return &table[type];
 }
 
@@ -275,7 +275,7 @@ const HycoElement *HycoElementGet(HycoCellType type)
    triangles repeat a node. */
 const HycoElement *HycoElementGetFacet(HycoCellType type)
 {
-  if (!ready) Tabulate();
+  if (!ready) ElementTabulate();
   switch (type) {
   case HYCO_LINE2:
     return &point;
@@ -303,7 +303,7 @@ const HycoElement *HycoElementGetFacet(HycoCellType type)
    instead. First-order facets have one normal, or are averaged by area. */
 const HycoElement *HycoElementGetFacetNodes(HycoCellType type)
 {
-  if (!ready) Tabulate();
+  if (!ready) ElementTabulate();
   switch (type) {
   case HYCO_TET10:
     return &tri6_nodes;

@@ -125,7 +125,7 @@ static PetscErrorCode ChooseElements(HycoScene scene, HycoMesh mesh, PetscBool b
 }
 
 /* Takes a reference to the DM of the tables; the scene must outlive fe. */
-static PetscErrorCode Create(HycoScene scene, DM dm, HycoMesh mesh, HycoFE *fe)
+static PetscErrorCode FECreate(HycoScene scene, DM dm, HycoMesh mesh, HycoFE *fe)
 {
   PetscBool *bbar;
   PetscErrorCode ierr;
@@ -175,7 +175,7 @@ PetscErrorCode HycoFECreate(HycoScene scene, DM dm, HycoFE *fe)
 
   PetscFunctionBegin;
   PetscCall(HycoMeshOf(dm, scene, &mesh));
-  PetscCall(Create(scene, dm, mesh, fe));
+  PetscCall(FECreate(scene, dm, mesh, fe));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -183,7 +183,7 @@ PetscErrorCode HycoFECreate(HycoScene scene, DM dm, HycoFE *fe)
 PetscErrorCode HycoFECreateRead(HycoScene scene, HycoMesh mesh, HycoFE *fe)
 {
   PetscFunctionBegin;
-  PetscCall(Create(scene, NULL, mesh, fe));
+  PetscCall(FECreate(scene, NULL, mesh, fe));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -200,7 +200,7 @@ PetscErrorCode HycoFECreateSurface(HycoScene scene, DM dm, HycoFE *fe)
   *surface = *mesh;
   /* Surfaces are moved and loaded without integrating a cell. */
   surface->n_cells = 0;
-  HycoOnError(Create(scene, dm, surface, fe), PetscCall(PetscFree(surface)));
+  HycoOnError(FECreate(scene, dm, surface, fe), PetscCall(PetscFree(surface)));
   (*fe)->surface = surface;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -231,13 +231,14 @@ PetscBool HycoBodyMoves(const HycoBody *body, const PetscBool changed[])
 }
 
 /* Whether the map of body b moves a node; at first all, by which HycoMirrorFind() sees how cells turn. */
-static PetscBool Takes(HycoFE fe, PetscBool first, PetscInt b, PetscInt node)
+static PetscBool FEIsTaken(HycoFE fe, PetscBool first, PetscInt b, PetscInt node)
 {
   return (PetscBool)(fe->mesh->node_body[node] == b && (first || !fe->on_surface || fe->on_surface[node]));
 }
 
-/* X = map(x, mu) of the bodies whose maps change. Maps act on the drawing, not on the last position: the result does not
-   depend on what was solved before. first: all bodies; so it is with ties, which place nodes of one by those of another. */
+/* X = map(x, mu) of the bodies whose maps change. Maps act on the drawing, not on the last position: the result does
+   not depend on what was solved before. first: all bodies; so it is with ties, which place nodes of one by those of
+   another. */
 static PetscErrorCode MoveNodes(HycoFE fe, PetscBool first, const PetscBool changed[])
 {
   HycoMesh m = fe->mesh;
@@ -265,8 +266,9 @@ static PetscErrorCode MoveNodes(HycoFE fe, PetscBool first, const PetscBool chan
       for (PetscInt i = 0, n; i < m->n_nodes; i += PetscMax(n, 1)) {
         PetscReal value[RUN];
 
-        /* Nodes of a body follow each other. A component without a map keeps its drawn coordinate (HycoFESetDrawn()). */
-        for (n = 0; n < RUN && i + n < m->n_nodes && Takes(fe, first, b, i + n);) n++;
+        /* Nodes of a body follow each other. A component without a map keeps its drawn coordinate
+           (HycoFESetDrawn()). */
+        for (n = 0; n < RUN && i + n < m->n_nodes && FEIsTaken(fe, first, b, i + n);) n++;
         if (n) PetscCall(HycoExprEval(map, fe->mu, n, m->xyz + 3 * i, value));
         for (PetscInt k = 0; k < n; k++) fe->X[3 * (i + k) + c] = value[k];
       }

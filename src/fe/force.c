@@ -61,7 +61,8 @@ typedef struct {
   PetscReal f[3]; /* uniform: per volume */
 } BodyForce;
 
-/* Force per volume plus gravity and centrifugal force at x. Forces per volume act on the moved body, not per drawn volume. */
+/* Force per volume plus gravity and centrifugal force at x. Forces per volume act on the moved body, not per drawn
+   volume. */
 static PetscErrorCode ForceAt(HycoFE fe, const BodyForce *b, const PetscReal x[3], PetscReal f[3])
 {
   const HycoBody *body = &fe->scene->body[b->body];
@@ -142,7 +143,7 @@ static PetscErrorCode AddCell(HycoFE fe, PetscInt cell, const PetscReal f[], Int
 }
 
 /* Whether this process applies a load to a facet: the process that has its cell does. */
-static PetscBool Acts(HycoFE fe, PetscInt facet)
+static PetscBool ForceIsLocal(HycoFE fe, PetscInt facet)
 {
   return (PetscBool)(fe->all_facets || fe->mesh->facet_cell[facet] >= 0);
 }
@@ -189,7 +190,7 @@ static PetscErrorCode SetShares(HycoFE fe, PetscInt group, HycoLoadShares *s)
   PetscCall(PetscCalloc1(4 * m->n_nodes, &sum));
   for (PetscInt f = 0; f < m->n_facets; f++) {
     /* Facets that a rank shares are integrated by each for its own nodes. */
-    if (m->facet_group[f] != group || !Acts(fe, f)) continue;
+    if (m->facet_group[f] != group || !ForceIsLocal(fe, f)) continue;
     for (PetscInt q = 0; q < el->nq; q++) {
       PetscReal v[4];
 
@@ -240,7 +241,7 @@ static PetscErrorCode AddUniformLoad(HycoFE fe, const HycoLoad *load, PetscInt g
 }
 
 /* The stiffness of a cell, kept from one parameter value to the next where HycoFEKeepStiffness() was called. */
-static PetscErrorCode Stiffness(HycoFE fe, PetscInt cell, PetscReal **Ke)
+static PetscErrorCode ForceStiffness(HycoFE fe, PetscInt cell, PetscReal **Ke)
 {
   const size_t n = (size_t)(HycoMeshCellSize(fe->mesh, cell) * fe->dim);
 
@@ -285,7 +286,7 @@ static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Into F)
     any = (PetscBool)(any || u0[k] != 0);
   }
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Stiffness(fe, cell, &Ke));
+  PetscCall(ForceStiffness(fe, cell, &Ke));
   for (PetscInt k = 0; k < n; k++) {
     /* u0 has the offsets of oblique supports, too: Ke is that of the eliminated unknowns. */
     const PetscInt i = node[k / m->dim], c = k % m->dim, global = m->node_global ? m->node_global[i] : i;
@@ -436,7 +437,7 @@ static PetscErrorCode AddForces(HycoFE fe, Into F)
     /* Shares are kept by load, as each may act on another surface. */
     if (!in_space) PetscCall(AddUniformLoad(fe, load, g, &fe->shares[k], F));
     for (PetscInt f = 0; f < m->n_facets && in_space; f++) {
-      if (m->facet_group[f] == g && Acts(fe, f)) PetscCall(AddFacetLoad(fe, load, f, F));
+      if (m->facet_group[f] == g && ForceIsLocal(fe, f)) PetscCall(AddFacetLoad(fe, load, f, F));
     }
   }
   for (PetscInt k = 0; k < fe->scene->n_point_loads; k++) PetscCall(AddPointLoad(fe, &fe->scene->point_load[k], F));

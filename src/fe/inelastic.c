@@ -196,9 +196,9 @@ static PetscErrorCode BatchDestroy(Batch *b)
 }
 
 /* Computes strains at the end of the step and reads the state at its begin; the law's strains exclude thermal strain.
-   Total and thermal strains go to the state separately. Gradients are kept in the batch for Scatter(), which needs them
-   for the forces. */
-static PetscErrorCode Gather(HycoFE fe, const HycoElement *el, Batch *b)
+   Total and thermal strains go to the state separately. Gradients are kept in the batch for InelasticScatter(), which
+   needs them for the forces. */
+static PetscErrorCode InelasticGather(HycoFE fe, const HycoElement *el, Batch *b)
 {
   const PetscInt ns = fe->n_sigma, body = fe->mesh->cell_body[b->cell[0]];
   const PetscInt n_state = fe->scene->body[body].law->n_state;
@@ -238,7 +238,7 @@ static PetscErrorCode Gather(HycoFE fe, const HycoElement *el, Batch *b)
 
 /* A linear law: stress and energy by fe's tangents. The potential of a linear law is its stored energy; Newton's
    line search adds it to those of the other laws. */
-static void Linear(HycoFE fe, const HycoElement *el, Batch *b)
+static void InelasticLinear(HycoFE fe, const HycoElement *el, Batch *b)
 {
   const PetscInt ns = fe->n_sigma, size = fe->tangent_size[fe->mesh->cell_body[b->cell[0]]];
 
@@ -257,7 +257,7 @@ static void Linear(HycoFE fe, const HycoElement *el, Batch *b)
 
 /* Sets energies that a law does not compute: without a stored energy, all of the work is dissipated; with one, the
    equivalent inelastic strain is the dissipation over the mean equivalent stress. */
-static void Complete(HycoFE fe, const HycoElement *el, Batch *b)
+static void InelasticComplete(HycoFE fe, const HycoElement *el, Batch *b)
 {
   const PetscInt ns = fe->n_sigma;
 
@@ -279,8 +279,8 @@ static void Complete(HycoFE fe, const HycoElement *el, Batch *b)
 }
 
 /* Evaluates the law of a body at n points of the batch; *failed: it has no solution at one. NaN marks what the law does
-   not compute; Complete() replaces it. A failure is reported, not raised: the caller halves the step. */
-static PetscErrorCode Update(HycoFE fe, PetscInt of, PetscInt n, Batch *b, PetscBool *failed)
+   not compute; InelasticComplete() replaces it. A failure is reported, not raised: the caller halves the step. */
+static PetscErrorCode InelasticUpdate(HycoFE fe, PetscInt of, PetscInt n, Batch *b, PetscBool *failed)
 {
   const HycoBody *body = &fe->scene->body[of];
   const PetscReal *constant[HYCO_MAX_DECLARED];
@@ -322,7 +322,7 @@ static PetscErrorCode Update(HycoFE fe, PetscInt of, PetscInt n, Batch *b, Petsc
 /* Adds a point's energies, so that the identity of the report holds. Trapezoidal rule of stress times strain
    increment. moduli: the rest of the balance, from moduli that changed with temperature during the step. Only cells
    whose first node is owned are counted, so that sums over ranks count each once. */
-static void Count(HycoFE fe, Batch *b, PetscInt i, const Point *from, const Point *to)
+static void InelasticCount(HycoFE fe, Batch *b, PetscInt i, const Point *from, const Point *to)
 {
   HycoFEStepReport *r = b->report;
   PetscReal work = 0, thermal = 0;
@@ -347,7 +347,7 @@ static void Count(HycoFE fe, Batch *b, PetscInt i, const Point *from, const Poin
 
 /* Writes the batch's results to the state, f_int, the tangents and the report. f_int is complete at owned nodes, as
    every part has all cells around these. */
-static void Scatter(HycoFE fe, const HycoElement *el, Batch *b, PetscBool linear)
+static void InelasticScatter(HycoFE fe, const HycoElement *el, Batch *b, PetscBool linear)
 {
   HycoMesh m = fe->mesh;
   const PetscInt ns = fe->n_sigma, body = m->cell_body[b->cell[0]], n_state = fe->scene->body[body].law->n_state;
@@ -367,7 +367,7 @@ static void Scatter(HycoFE fe, const HycoElement *el, Batch *b, PetscBool linear
       *to.accumulated = *from.accumulated + b->increment[i];
       HycoPointForce(fe, el, b->g + i * b->nv, fe->bbar[body] ? b->mean + k * b->nv : NULL, b->w[i], s, f);
       b->report->increment = PetscMax(b->report->increment, b->increment[i]);
-      if (HycoMeshOwned(fe->mesh, fe->mesh->cells[cell * fe->mesh->nv]) >= 0) Count(fe, b, i, &from, &to);
+      if (HycoMeshOwned(fe->mesh, fe->mesh->cells[cell * fe->mesh->nv]) >= 0) InelasticCount(fe, b, i, &from, &to);
       /* Symmetrised, because K is assembled and factored as a symmetric matrix. */
       for (PetscInt r = 0; r < ns && b->tangents && !linear; r++) {
         const PetscReal *C = b->tangent + i * ns * ns;
@@ -382,21 +382,21 @@ static void Scatter(HycoFE fe, const HycoElement *el, Batch *b, PetscBool linear
 }
 
 /* The four phases of one batch; a batch with a failure leaves no results. */
-static PetscErrorCode Step(HycoFE fe, const HycoElement *el, Batch *b)
+static PetscErrorCode InelasticStep(HycoFE fe, const HycoElement *el, Batch *b)
 {
   PetscBool failed = PETSC_FALSE, linear;
 
   PetscFunctionBegin;
   if (!b->n) PetscFunctionReturn(PETSC_SUCCESS);
   linear = fe->scene->body[fe->mesh->cell_body[b->cell[0]]].law->linear;
-  PetscCall(Gather(fe, el, b));
+  PetscCall(InelasticGather(fe, el, b));
   if (linear)
-    Linear(fe, el, b);
+    InelasticLinear(fe, el, b);
   else
-    PetscCall(Update(fe, fe->mesh->cell_body[b->cell[0]], b->n * el->nq, b, &failed));
-  if (!linear && !failed) Complete(fe, el, b);
+    PetscCall(InelasticUpdate(fe, fe->mesh->cell_body[b->cell[0]], b->n * el->nq, b, &failed));
+  if (!linear && !failed) InelasticComplete(fe, el, b);
   /* The state before stays untouched by a failed batch: the step is tried again. */
-  if (!failed) Scatter(fe, el, b, linear);
+  if (!failed) InelasticScatter(fe, el, b, linear);
   b->n = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -413,10 +413,10 @@ static PetscErrorCode StepAll(HycoFE fe, HycoBodies bodies, Batch *b)
 
     /* Linear cells of a model's path are a constant matrix. */
     if (bodies == HYCO_BODIES_FLOWING && linear) continue;
-    if (b->n == BATCH || (b->n && m->cell_body[e] != m->cell_body[b->cell[0]])) PetscCall(Step(fe, el, b));
+    if (b->n == BATCH || (b->n && m->cell_body[e] != m->cell_body[b->cell[0]])) PetscCall(InelasticStep(fe, el, b));
     b->cell[b->n++] = e;
   }
-  PetscCall(Step(fe, el, b));
+  PetscCall(InelasticStep(fe, el, b));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -551,8 +551,8 @@ PetscErrorCode HycoFEPointRows(HycoFE fe, PetscInt cell, PetscInt q, PetscReal B
 }
 
 /* s = C (strain - thermal strain) - stress, 0 where it is round-off. Returns the largest of the terms. */
-static PetscReal Lost(HycoFE fe, PetscInt cell, PetscInt q, const PetscReal elastic[], const PetscReal stress[],
-                      PetscReal s[])
+static PetscReal InelasticStressLost(HycoFE fe, PetscInt cell, PetscInt q, const PetscReal elastic[],
+                                     const PetscReal stress[], PetscReal s[])
 {
   const PetscInt ns = fe->n_sigma, size = fe->tangent_size[fe->mesh->cell_body[cell]];
   PetscReal most = 0, terms = 0;
@@ -578,7 +578,7 @@ void HycoFEInelasticStress(HycoFE fe, HycoFEState state, PetscInt cell, PetscInt
 
   for (PetscInt c = 0; c < fe->n_sigma; c++) elastic[c] = p.strain[c] - (c < 3 ? *p.thermal : 0);
   /* The tangents must be elastic here (HycoFEElasticTangent()). */
-  (void)Lost(fe, cell, q, elastic, p.stress, s);
+  (void)InelasticStressLost(fe, cell, q, elastic, p.stress, s);
 }
 
 /* The law's input at n points of one body, without thermal strains. For models with laws at few points, which bring
@@ -617,7 +617,7 @@ static void ScatterPoints(HycoFE fe, const HycoElement *el, PetscInt n, const Pe
     const PetscInt cell = point[i] / el->nq, q = point[i] % el->nq;
     const PetscReal *C = fe->tangent + fe->tangent_start[cell] + q * ns * ns, *Ct = b->tangent + i * ns * ns;
 
-    size[i] = Lost(fe, cell, q, b->strain + i * ns, b->stress + i * ns, s + i * ns);
+    size[i] = InelasticStressLost(fe, cell, q, b->strain + i * ns, b->stress + i * ns, s + i * ns);
     for (PetscInt r = 0; r < ns && b->tangents; r++) {
       /* The symmetric part, as the global tangent takes. */
       for (PetscInt c = 0; c < ns; c++)
@@ -647,7 +647,7 @@ PetscErrorCode HycoFEStepPoints(HycoFE fe, PetscInt n, const PetscInt point[], c
     /* Points of one body that follow each other share an evaluation. */
     while (from + more < n && more < BATCH * el->nq && of[point[from + more] / el->nq] == body) more++;
     GatherPoints(fe, el, more, point + from, strain + from * ns, &b);
-    ierr = Update(fe, body, more, &b, &failed);
+    ierr = InelasticUpdate(fe, body, more, &b, &failed);
     if (!ierr && !failed)
       ScatterPoints(fe, el, more, point + from, &b, s + from * ns, size + from,
                     tangent ? tangent + from * ns * ns : NULL);
@@ -728,9 +728,9 @@ static PetscErrorCode BatchRates(HycoFE fe, const HycoElement *el, Batch *b, Pet
 
   PetscFunctionBegin;
   if (!b->n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Gather(fe, el, b));
-  PetscCall(Update(fe, fe->mesh->cell_body[b->cell[0]], b->n * el->nq, b, &failed));
-  if (!failed) Complete(fe, el, b);
+  PetscCall(InelasticGather(fe, el, b));
+  PetscCall(InelasticUpdate(fe, fe->mesh->cell_body[b->cell[0]], b->n * el->nq, b, &failed));
+  if (!failed) InelasticComplete(fe, el, b);
   for (PetscInt i = 0; i < b->n * el->nq; i++) {
     const PetscInt cell = b->cell[i / el->nq];
 
@@ -741,8 +741,8 @@ static PetscErrorCode BatchRates(HycoFE fe, const HycoElement *el, Batch *b, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A step without strain in so short a time that stresses do not change. Begin and end are one state: what Gather() writes
-   is what it has. */
+/* A step without strain in so short a time that stresses do not change. Begin and end are one state: what
+   InelasticGather() writes is what it has. */
 PetscErrorCode HycoFERates(HycoFE fe, const PetscReal u[], PetscReal t, PetscReal dt, HycoFEState state,
                            PetscReal rate[], PetscReal *largest)
 {

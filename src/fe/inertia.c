@@ -4,7 +4,7 @@
 
 /* Entries that do not depend on the position, evaluated at the origin. For gravity and axes: each is one vector for all
    bodies. */
-static PetscErrorCode Vector(HycoFE fe, HycoExpr const e[3], PetscReal v[3])
+static PetscErrorCode InertiaVector(HycoFE fe, HycoExpr const e[3], PetscReal v[3])
 {
   const PetscReal nowhere[3] = {0, 0, 0};
 
@@ -31,8 +31,8 @@ static PetscErrorCode SetAxis(HycoFE fe, const HycoMotion *m, HycoAcceleration *
     HycoCheck(c < fe->dim || !m->through[c], "%s: the mesh has %d space dimension%s", HycoExprKey(m->through[c]),
               (int)fe->dim, fe->dim == 1 ? "" : "s");
   }
-  PetscCall(Vector(fe, m->axis, a->axis));
-  PetscCall(Vector(fe, m->through, a->through));
+  PetscCall(InertiaVector(fe, m->axis, a->axis));
+  PetscCall(InertiaVector(fe, m->through, a->through));
   /* Perpendicular to the plane, or the axis of revolution. */
   if (fe->dim < 3) a->axis[fe->formulation == HYCO_AXISYMMETRIC ? 1 : 2] = 1;
   length = HycoLength(a->axis);
@@ -53,7 +53,7 @@ PetscErrorCode HycoAccelerationSet(HycoFE fe, const HycoBody *body, HycoAccelera
   /* A body without density has no weight. */
   a->any = HycoSceneHasInertia(fe->scene, body, NULL);
   if (!a->any) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Vector(fe, m->gravity, a->gravity));
+  PetscCall(InertiaVector(fe, m->gravity, a->gravity));
   HycoCheck(fe->formulation != HYCO_AXISYMMETRIC || a->gravity[0] == 0,
             "gravity_x: in an axisymmetric scene x is the radius, and gravity acts along y");
   if (!m->speed) PetscFunctionReturn(PETSC_SUCCESS);

@@ -19,7 +19,7 @@ PetscReal HycoDeterminant(const HycoElement *el, const PetscInt node[], const Pe
 }
 
 /* The radius of a point from its shape functions N at these nodes. */
-static PetscReal Radius(HycoFE fe, PetscInt n, const PetscInt node[], const PetscReal N[])
+static PetscReal KinematicsRadius(HycoFE fe, PetscInt n, const PetscInt node[], const PetscReal N[])
 {
   PetscReal r = 0;
 
@@ -79,7 +79,7 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
   *weight = PetscAbsReal(det) * el->w[q];
   if (fe->formulation == HYCO_AXISYMMETRIC) {
     /* Above 0 at a quadrature point: CheckAxis() keeps the cells on one side of the axis. */
-    const PetscReal r = Radius(fe, el->nv, node, el->N[q]);
+    const PetscReal r = KinematicsRadius(fe, el->nv, node, el->N[q]);
 
     for (PetscInt a = 0; a < el->nv; a++) g[a][2] = el->N[q][a] / r;
     *weight *= 2 * PETSC_PI * r;
@@ -104,7 +104,7 @@ PetscErrorCode HycoPointWeights(HycoFE fe, const HycoElement *el, PetscInt cell,
   if (fe->weighed_at[cell] == fe->moved_at[fe->mesh->cell_body[cell]]) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt q = 0; q < el->nq; q++) {
     w[q] = PetscAbsReal(HycoDeterminant(el, node, fe->X, q)) * el->w[q];
-    if (fe->formulation == HYCO_AXISYMMETRIC) w[q] *= 2 * PETSC_PI * Radius(fe, el->nv, node, el->N[q]);
+    if (fe->formulation == HYCO_AXISYMMETRIC) w[q] *= 2 * PETSC_PI * KinematicsRadius(fe, el->nv, node, el->N[q]);
     if (fe->cell_weight) w[q] *= fe->cell_weight[cell];
   }
   fe->weighed_at[cell] = fe->moved_at[fe->mesh->cell_body[cell]];
@@ -244,7 +244,7 @@ PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet,
   PetscFunctionBegin;
   PetscCall(HycoFacetDirection(fe, el, facet, q, n));
   for (PetscInt c = 0; fe->formulation == HYCO_AXISYMMETRIC && c < 3; c++)
-    n[c] *= 2 * PETSC_PI * Radius(fe, el->nv, node, el->N[q]);
+    n[c] *= 2 * PETSC_PI * KinematicsRadius(fe, el->nv, node, el->N[q]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

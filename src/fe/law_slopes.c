@@ -1,6 +1,7 @@
 /*
-  Laws at some integration points along known displacements, with the derivatives of their states by parameters: a step's
-  derivative follows from that of the displacements, of the state before it, and of the data beside the parameters.
+  Laws at some integration points along known displacements, with the derivatives of their states by parameters: a
+  step's derivative follows from that of the displacements, of the state before it, and of the data beside the
+  parameters.
 */
 #include <hycoinelastic.h>
 #include <hycokinematics.h>
@@ -123,7 +124,7 @@ PetscErrorCode HycoFEPointsAccept(HycoFEPoints p)
 }
 
 /* Strains of u, n x n_sigma, and the weights (NULL: not wanted). */
-static PetscErrorCode Strains(HycoFEPoints p, const PetscReal u[], PetscReal strain[], PetscReal weight[])
+static PetscErrorCode LawDerivativesStrains(HycoFEPoints p, const PetscReal u[], PetscReal strain[], PetscReal weight[])
 {
   HycoFE fe = p->fe;
   const HycoElement *el = HycoElementGet(fe->mesh->type);
@@ -165,7 +166,7 @@ static PetscErrorCode TakeData(HycoFEPoints p, const PetscReal u[], Data *d, con
   }
   if (u) d->place = fe->place;
   if (u)
-    PetscCall(Strains(p, u, d->strain, d->weight));
+    PetscCall(LawDerivativesStrains(p, u, d->strain, d->weight));
   else {
     d->place = p->data[0].place;
     PetscCall(PetscArraycpy(d->x, p->data[0].x, 3 * p->n));
@@ -261,7 +262,7 @@ PetscBool HycoFEPointsChange(HycoFEPoints p, const PetscBool changed[], PetscBoo
 }
 
 /* At fe's parameters, which are not those of the step. */
-PetscErrorCode HycoFEPointsBeside(HycoFEPoints p, PetscInt id, PetscBool changes, const PetscReal u[])
+PetscErrorCode HycoFEPointsPerturbed(HycoFEPoints p, PetscInt id, PetscBool changes, const PetscReal u[])
 {
   const PetscReal **constant;
 
@@ -278,30 +279,30 @@ PetscErrorCode HycoFEPointsBeside(HycoFEPoints p, PetscInt id, PetscBool changes
   ((weight)[0] * (p)->data[0].array[i] + (weight)[1] * (p)->data[(p)->data[(id)[1]].there ? (id)[1] : 0].array[i] +    \
    (weight)[2] * (p)->data[(p)->data[(id)[2]].there ? (id)[2] : 0].array[i])
 
-static PetscBool Moves(HycoFEPoints p, const PetscInt id[3])
+static PetscBool LawDerivativesMove(HycoFEPoints p, const PetscInt id[3])
 {
   return (PetscBool)(p->data[id[1]].there || p->data[id[2]].there);
 }
 
-static PetscBool Strained(HycoFEPoints p, const PetscInt id[3])
+static PetscBool LawStrainDerivatives(HycoFEPoints p, const PetscInt id[3])
 {
-  return (PetscBool)(Moves(p, id) && p->data[id[1]].strained && p->data[id[2]].strained);
+  return (PetscBool)(LawDerivativesMove(p, id) && p->data[id[1]].strained && p->data[id[2]].strained);
 }
 
-void HycoFEPointsWeightSlope(HycoFEPoints p, const PetscReal weight[3], const PetscInt id[3], PetscReal slope[])
+void HycoFEPointsWeightDerivatives(HycoFEPoints p, const PetscReal weight[3], const PetscInt id[3], PetscReal slope[])
 {
-  for (PetscInt i = 0; i < p->n; i++) slope[i] = Strained(p, id) ? SUM(p, id, weight, weight, i) : 0;
+  for (PetscInt i = 0; i < p->n; i++) slope[i] = LawStrainDerivatives(p, id) ? SUM(p, id, weight, weight, i) : 0;
 }
 
-PetscErrorCode HycoFEPointsSlope(HycoFEPoints p, PetscInt k, const PetscReal weight[3], const PetscInt id[3],
-                                 const PetscReal du[], PetscReal ds[], PetscReal dstress[], PetscBool *smooth)
+PetscErrorCode HycoFEPointsDerivatives(HycoFEPoints p, PetscInt k, const PetscReal weight[3], const PetscInt id[3],
+                                       const PetscReal du[], PetscReal ds[], PetscReal dstress[], PetscBool *smooth)
 {
   const PetscInt ns = p->fe->n_sigma;
-  const PetscBool moves = Moves(p, id), strained = Strained(p, id);
+  const PetscBool moves = LawDerivativesMove(p, id), strained = LawStrainDerivatives(p, id);
   PetscReal *lost = ds ? ds : p->by_lost, *stress = dstress ? dstress : p->by_stress, rate = 0, apart = 0;
 
   PetscFunctionBegin;
-  PetscCall(Strains(p, du, p->along, NULL));
+  PetscCall(LawDerivativesStrains(p, du, p->along, NULL));
   for (PetscInt i = 0; i < p->n && moves; i++) {
     p->hot[i] = SUM(p, id, weight, temperature, i);
     for (PetscInt c = 0; c < ns; c++) {
@@ -313,13 +314,13 @@ PetscErrorCode HycoFEPointsSlope(HycoFEPoints p, PetscInt k, const PetscReal wei
     const PetscInt at = p->run[r], n = p->run[r + 1] - at, n_constants = LawOf(p, r)->constants.n;
     const HycoMaterialPoints m = RunOf(p, r);
     const PetscReal *constant[HYCO_MAX_DECLARED];
-    HycoMaterialSlope d = {.strain = p->along + at * ns,
-                           .state0 = p->slope0 + k * p->n_state + p->state_at[r],
-                           .constant = moves ? constant : NULL,
-                           .temperature = m.temperature ? p->hot + at : NULL,
-                           .state = p->slope + k * p->n_state + p->state_at[r],
-                           .stress = stress + at * ns,
-                           .lost = lost + at * ns};
+    HycoMaterialDerivative d = {.strain = p->along + at * ns,
+                                .state0 = p->slope0 + k * p->n_state + p->state_at[r],
+                                .constant = moves ? constant : NULL,
+                                .temperature = m.temperature ? p->hot + at : NULL,
+                                .state = p->slope + k * p->n_state + p->state_at[r],
+                                .stress = stress + at * ns,
+                                .lost = lost + at * ns};
 
     for (PetscInt j = 0; j < n_constants; j++) {
       constant[j] = p->change + at * HYCO_MAX_DECLARED + j * n;

@@ -7,7 +7,8 @@
 #include <hycokinematics.h>
 #include <hycomaterialimpl.h>
 
-/* Numbers of one kind of several cells, which follow each other; functions of them go into both clones of their caller. */
+/* Numbers of one kind of several cells, which follow each other; functions of them go into both clones of their
+   caller. */
 #if defined(__GNUC__)
 #define LANES   4
 #define INLINED static inline __attribute__((always_inline))
@@ -18,13 +19,14 @@ typedef PetscReal Lanes __attribute__((vector_size(LANES * sizeof(PetscReal)), a
 typedef PetscReal Lanes;
 #endif
 
-/* Sums over the points of the cells: of stress, von Mises stress, energy density, each times the weight; and of the weights. */
+/* Sums over the points of the cells: of stress, von Mises stress, energy density, each times the weight; and of the
+   weights. */
 typedef struct {
   Lanes stress[6], mises, stored, volume;
 } Sums;
 
 /* Whether the pass serves all cells of fe. */
-static PetscBool Serves(HycoFE fe)
+static PetscBool LinearFieldsIsUsable(HycoFE fe)
 {
   if (fe->dim == 1 || fe->formulation == HYCO_AXISYMMETRIC) return PETSC_FALSE;
   for (PetscInt b = 0; b < fe->scene->n_bodies; b++) {
@@ -78,8 +80,8 @@ INLINED void AddGradients(PetscInt dim, PetscInt nv, const Lanes g[], const Lane
   }
 }
 
-/* Adds a point of weight w. C: Lame's constants, and the thermal strain. Engineering shear strains, in the order xx yy zz
-   xy yz xz; in 2D plane strain. Inlined for each dimension. */
+/* Adds a point of weight w. C: Lame's constants, and the thermal strain. Engineering shear strains, in the order xx yy
+   zz xy yz xz; in 2D plane strain. Inlined for each dimension. */
 INLINED void AddPoint(PetscInt dim, const Lanes *w, const Lanes C[3], Lanes h[3][3], Sums *s)
 {
   const PetscInt ns = dim == 2 ? 4 : 6;
@@ -148,7 +150,7 @@ PetscErrorCode HycoFELinearFields(HycoFE fe, const PetscReal u[], PetscReal sigm
   const PetscInt dim = fe->dim, ns = fe->n_sigma, n_groups = (fe->mesh->n_cells + LANES - 1) / LANES;
 
   PetscFunctionBegin;
-  *served = Serves(fe);
+  *served = LinearFieldsIsUsable(fe);
   if (!*served) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(KeepLanes(fe, el, n_groups));
   *stored = 0;

@@ -33,7 +33,7 @@ static PetscBool IsLinear(HycoFE fe, PetscInt cell)
 
 /* The nodes of the linear cells around node i, ascending, in list; returns their number. Insertion keeps the list
    sorted; a node has at most some tens of neighbours. The columns of a row of blocks. */
-static PetscInt Neighbours(HycoFE fe, PetscInt n, const PetscInt around[], PetscInt list[])
+static PetscInt LinearForceNeighbours(HycoFE fe, PetscInt n, const PetscInt around[], PetscInt list[])
 {
   const PetscInt nv = fe->mesh->nv;
   PetscInt count = 0;
@@ -66,7 +66,8 @@ static PetscErrorCode ListRows(HycoLinearForce f, const PetscBool nodes[])
   PetscCall(PetscMalloc1(m->n_nodes + 1, &f->start));
   f->start[0] = 0;
   for (PetscInt i = 0; i < m->n_nodes; i++) {
-    const PetscInt n = nodes && !nodes[i] ? 0 : Neighbours(f->fe, first[i + 1] - first[i], around + first[i], list);
+    const PetscInt n =
+        nodes && !nodes[i] ? 0 : LinearForceNeighbours(f->fe, first[i + 1] - first[i], around + first[i], list);
     const PetscInt at = f->start[f->n_rows];
 
     f->row[i] = -1;

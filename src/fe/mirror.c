@@ -6,7 +6,7 @@
 #include <hycokinematics.h>
 
 /* The sign of a cell's volume with its nodes at X: the sum over its quadrature points. */
-static PetscInt Sign(HycoMesh m, const HycoElement *el, PetscInt cell, const PetscReal X[])
+static PetscInt MirrorSign(HycoMesh m, const HycoElement *el, PetscInt cell, const PetscReal X[])
 {
   PetscReal volume = 0;
 
@@ -26,7 +26,7 @@ PetscErrorCode HycoMirrorCreate(HycoFE fe)
   PetscCall(PetscCalloc1(fe->scene->n_bodies, &fe->mirrored));
   PetscCall(PetscMalloc1(fe->mesh->n_cells, &fe->drawn_sign));
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++)
-    fe->drawn_sign[e] = (signed char)Sign(fe->mesh, el, e, fe->mesh->xyz);
+    fe->drawn_sign[e] = (signed char)MirrorSign(fe->mesh, el, e, fe->mesh->xyz);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -79,7 +79,7 @@ static PetscErrorCode CellsTurn(HycoFE fe, PetscInt turn[], PetscInt first[])
 
     if (fe->moved_at[b] != fe->place) continue;
     /* The sign relative to the drawing: files may number cells in either orientation. */
-    sign = map[0] || map[1] || map[2] ? fe->drawn_sign[e] * Sign(m, el, e, fe->X) : 1;
+    sign = map[0] || map[1] || map[2] ? fe->drawn_sign[e] * MirrorSign(m, el, e, fe->X) : 1;
 
     HycoCheck(sign, "cell %d is degenerate: its volume vanishes", (int)m->cell_id[e]);
     if (!turn[b]) first[b] = e;

@@ -23,7 +23,7 @@ void HycoObliqueClear(HycoFE fe)
 }
 
 /* Eliminates from the row n.u = v the other directions at the node. */
-static void Substitute(HycoFE fe, PetscInt node, PetscReal n[3], PetscReal *v)
+static void ObliqueSubstitute(HycoFE fe, PetscInt node, PetscReal n[3], PetscReal *v)
 {
   for (PetscInt k = 0; k < fe->n_oblique; k++) {
     const HycoOblique *o = &fe->oblique[k];
@@ -69,7 +69,7 @@ PetscErrorCode HycoObliqueAdd(HycoFE fe, PetscInt support, PetscInt node, const 
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(n, direction, 3));
   HycoNormalise(n);
-  Substitute(fe, node, n, &v);
+  ObliqueSubstitute(fe, node, n, &v);
   for (PetscInt d = 0; d < fe->dim; d++) {
     if (fe->fixed[node * fe->dim + d] || PetscAbsReal(n[d]) <= best * (1 + 1e-9)) continue;
     best = PetscAbsReal(n[d]);

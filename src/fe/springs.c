@@ -55,7 +55,7 @@ static PetscErrorCode ForEach(HycoFE fe, const PetscInt around[],
 }
 
 /* First pass: numbers per cell. */
-static PetscErrorCode Count(HycoFE fe, PetscInt spring, PetscInt cell, PetscInt facet, PetscInt node, void *ctx)
+static PetscErrorCode SpringsCount(HycoFE fe, PetscInt spring, PetscInt cell, PetscInt facet, PetscInt node, void *ctx)
 {
   PetscFunctionBegin;
   (void)fe, (void)spring, (void)facet, (void)node;
@@ -64,7 +64,7 @@ static PetscErrorCode Count(HycoFE fe, PetscInt spring, PetscInt cell, PetscInt 
 }
 
 /* start[cell] is the position of the cell's next spring. */
-static PetscErrorCode Put(HycoFE fe, PetscInt spring, PetscInt cell, PetscInt facet, PetscInt node, void *ctx)
+static PetscErrorCode SpringsInsert(HycoFE fe, PetscInt spring, PetscInt cell, PetscInt facet, PetscInt node, void *ctx)
 {
   HycoSprings s = (HycoSprings)ctx;
   const PetscInt at = s->start[cell]++;
@@ -105,7 +105,7 @@ PetscErrorCode HycoSpringsCreate(HycoFE fe)
   /* Descending: the cell with the smallest tag is written last. */
   for (PetscInt k = m->n_cells * m->nv - 1; k >= 0; k--) around[m->cells[k]] = k / m->nv;
   PetscCall(PetscCalloc1(m->n_cells + 2, &s->start));
-  PetscCall(ForEach(fe, around, Count, s));
+  PetscCall(ForEach(fe, around, SpringsCount, s));
   for (PetscInt e = 0; e < m->n_cells; e++) s->start[e + 1] += s->start[e];
   s->n = s->start[m->n_cells];
   s->size = m->nf * m->dim * m->nf * m->dim;
@@ -113,8 +113,8 @@ PetscErrorCode HycoSpringsCreate(HycoFE fe)
   PetscCall(PetscMalloc1(s->n, &s->facet));
   PetscCall(PetscMalloc1(s->n, &s->node));
   PetscCall(PetscMalloc1(s->n * s->size, &s->K));
-  PetscCall(ForEach(fe, around, Put, s));
-  /* Put() has moved each start to the end of its cell: back by one. */
+  PetscCall(ForEach(fe, around, SpringsInsert, s));
+  /* SpringsInsert() has moved each start to the end of its cell: back by one. */
   for (PetscInt e = m->n_cells; e > 0; e--) s->start[e] = s->start[e - 1];
   s->start[0] = 0;
   PetscCall(PetscFree(around));
@@ -122,7 +122,7 @@ PetscErrorCode HycoSpringsCreate(HycoFE fe)
 }
 
 /* The four stiffnesses at a point. */
-static PetscErrorCode Evaluate(HycoFE fe, const HycoSpring *spring, const PetscReal x[3], PetscReal k[4])
+static PetscErrorCode SpringsEvaluate(HycoFE fe, const HycoSpring *spring, const PetscReal x[3], PetscReal k[4])
 {
   PetscFunctionBegin;
   for (PetscInt c = 0; c < 4; c++) {
@@ -140,7 +140,7 @@ static PetscErrorCode Evaluate(HycoFE fe, const HycoSpring *spring, const PetscR
 }
 
 /* Nodes of spring k; returns their number. */
-static PetscInt Nodes(HycoMesh m, const HycoSprings s, PetscInt k, const PetscInt *node[])
+static PetscInt SpringsNodes(HycoMesh m, const HycoSprings s, PetscInt k, const PetscInt *node[])
 {
   *node = s->facet[k] < 0 ? &s->node[k] : m->facets + s->facet[k] * m->nf;
   return s->facet[k] < 0 ? 1 : m->nf;
@@ -152,7 +152,7 @@ static PetscErrorCode PointMatrix(HycoFE fe, const HycoSpring *spring, PetscInt 
   PetscReal k[4];
 
   PetscFunctionBegin;
-  PetscCall(Evaluate(fe, spring, fe->X + 3 * node, k));
+  PetscCall(SpringsEvaluate(fe, spring, fe->X + 3 * node, k));
   for (PetscInt c = 0; c < fe->dim; c++) K[c * fe->dim + c] = k[c];
   /* The normal of an end of a line is its axis. */
   if (fe->dim == 1) K[0] += k[3];
@@ -177,7 +177,7 @@ static PetscErrorCode FacetMatrix(HycoFE fe, const HycoSpring *spring, PetscInt 
     for (PetscInt a = 0; a < m->nf; a++) {
       for (PetscInt c = 0; c < 3; c++) x[c] += el->N[q][a] * fe->X[3 * m->facets[facet * m->nf + a] + c];
     }
-    PetscCall(Evaluate(fe, spring, x, k));
+    PetscCall(SpringsEvaluate(fe, spring, x, k));
     for (PetscInt r = 0; r < n; r++) {
       for (PetscInt t = 0; t < n; t++) {
         const PetscInt c = r % m->dim, d = t % m->dim;
@@ -215,7 +215,7 @@ PetscErrorCode HycoSpringsSet(HycoFE fe)
    node that it owns, but not all facets of its cells. */
 static PetscBool IsOwn(HycoFE fe, PetscInt k)
 {
-  const PetscInt *node, n = Nodes(fe->mesh, fe->springs, k, &node);
+  const PetscInt *node, n = SpringsNodes(fe->mesh, fe->springs, k, &node);
   PetscInt least = node[0];
 
   for (PetscInt a = 1; a < n; a++) least = PetscMin(least, node[a]);
@@ -233,7 +233,7 @@ void HycoSpringsAddStiffness(HycoFE fe, PetscInt cell, PetscBool counted, PetscR
   for (PetscInt k = s ? s->start[cell] : 0; s && k < s->start[cell + 1]; k++) {
     const PetscReal *K = s->K + k * s->size;
     const PetscInt *node;
-    const PetscInt n_nodes = Nodes(m, s, k, &node), size = n_nodes * dim;
+    const PetscInt n_nodes = SpringsNodes(m, s, k, &node), size = n_nodes * dim;
     PetscInt at[HYCO_FACET_NODES];
 
     if (counted && !IsOwn(fe, k)) continue;
@@ -263,11 +263,11 @@ void HycoSpringsMarkVarying(HycoFE fe, const PetscBool changed[])
 }
 
 /* Force of spring k on the unknowns of its nodes at u: -K u; returns its energy, u^T K u / 2. */
-static PetscReal Pull(HycoFE fe, PetscInt k, const PetscReal u[], PetscReal force[MAX_FACET_DOFS])
+static PetscReal SpringForce(HycoFE fe, PetscInt k, const PetscReal u[], PetscReal force[MAX_FACET_DOFS])
 {
   const HycoSprings s = fe->springs;
   const PetscReal *K = s->K + k * s->size;
-  const PetscInt *node, n = Nodes(fe->mesh, s, k, &node) * fe->dim;
+  const PetscInt *node, n = SpringsNodes(fe->mesh, s, k, &node) * fe->dim;
   PetscReal energy = 0;
 
   for (PetscInt r = 0; r < n; r++) {
@@ -283,10 +283,10 @@ static PetscReal Pull(HycoFE fe, PetscInt k, const PetscReal u[], PetscReal forc
 void HycoSpringsAddForces(HycoFE fe, PetscReal scale, const PetscReal u[], PetscReal f[])
 {
   for (PetscInt k = 0; fe->springs && k < fe->springs->n; k++) {
-    const PetscInt *node, n = Nodes(fe->mesh, fe->springs, k, &node) * fe->dim;
+    const PetscInt *node, n = SpringsNodes(fe->mesh, fe->springs, k, &node) * fe->dim;
     PetscReal force[MAX_FACET_DOFS];
 
-    (void)Pull(fe, k, u, force);
+    (void)SpringForce(fe, k, u, force);
     for (PetscInt r = 0; r < n; r++) f[node[r / fe->dim] * fe->dim + r % fe->dim] += scale * force[r];
   }
 }
@@ -297,7 +297,7 @@ PetscReal HycoSpringsEnergy(HycoFE fe, const PetscReal u[])
   PetscReal sum = 0, force[MAX_FACET_DOFS];
 
   for (PetscInt k = 0; fe->springs && k < fe->springs->n; k++) {
-    if (IsOwn(fe, k)) sum += Pull(fe, k, u, force);
+    if (IsOwn(fe, k)) sum += SpringForce(fe, k, u, force);
   }
   return sum;
 }
@@ -309,7 +309,7 @@ PetscErrorCode HycoSpringsVisit(HycoFE fe, HycoSpringVisit visit, void *ctx)
 
   PetscFunctionBegin;
   for (PetscInt k = 0; s && k < s->n; k++) {
-    const PetscInt *node, n = Nodes(fe->mesh, s, k, &node);
+    const PetscInt *node, n = SpringsNodes(fe->mesh, s, k, &node);
 
     if (IsOwn(fe, k)) PetscCall((*visit)(fe, s->spring[k], n, node, s->K + k * s->size, ctx));
   }

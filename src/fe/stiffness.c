@@ -232,7 +232,7 @@ PetscErrorCode HycoFECountedStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
 }
 
 /* Number in the distributed vectors. */
-static PetscInt Global(HycoMesh m, PetscInt node)
+static PetscInt StiffnessGlobal(HycoMesh m, PetscInt node)
 {
   return m->node_global ? m->node_global[node] : node;
 }
@@ -248,7 +248,7 @@ static PetscErrorCode CountNeighbours(HycoMesh m, PetscInt n_owned, PetscInt fir
   PetscCall(PetscMalloc1(m->n_nodes, &seen));
   for (PetscInt i = 0; i < m->n_nodes; i++) seen[i] = -1;
   for (PetscInt i = 0; i < m->n_nodes; i++) {
-    const PetscInt row = Global(m, i) - first;
+    const PetscInt row = StiffnessGlobal(m, i) - first;
 
     /* Rows of other ranks are counted there. */
     if (row < 0 || row >= n_owned) continue;
@@ -258,7 +258,7 @@ static PetscErrorCode CountNeighbours(HycoMesh m, PetscInt n_owned, PetscInt fir
       const PetscInt n = HycoMeshCellNodes(m, around[k], node);
 
       for (PetscInt v = 0; v < n; v++) {
-        const PetscInt j = node[v], col = Global(m, j) - first;
+        const PetscInt j = node[v], col = StiffnessGlobal(m, j) - first;
 
         if (seen[j] == i) continue;
         seen[j] = i;
@@ -308,7 +308,7 @@ static PetscErrorCode AddElement(HycoFE fe, PetscInt cell, const PetscReal Ae[],
     const PetscInt i = node[v];
 
     for (PetscInt c = 0; c < m->dim; c++) {
-      const PetscInt row = Global(m, i) * m->dim + c, k = v * m->dim + c;
+      const PetscInt row = StiffnessGlobal(m, i) * m->dim + c, k = v * m->dim + c;
 
       index[k] = row;
       if (fe->fixed[i * m->dim + c]) {

@@ -108,8 +108,8 @@ static PetscErrorCode KeepMean(HycoFE fe, const HycoElement *el, PetscInt cell, 
 
 /* For many displacements on one mesh: the mean gradients of each cell are kept from the first call on, NaN marking
    those that are not there yet. *kept is freed by the caller, when nodes move. */
-PetscErrorCode HycoFEStressKept(HycoFE fe, const PetscBool in[], const PetscReal u[], PetscReal **kept,
-                                PetscReal sigma[])
+PetscErrorCode HycoFEStressMatrixKept(HycoFE fe, const PetscBool in[], const PetscReal u[], PetscReal **kept,
+                                      PetscReal sigma[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
   const PetscInt n = fe->mesh->n_cells, size = 3 * el->nv;
@@ -139,8 +139,8 @@ PetscErrorCode HycoFEStressKept(HycoFE fe, const PetscBool in[], const PetscReal
 }
 
 /* B^T C by: the tangents are symmetric. */
-PetscErrorCode HycoFEAddStressSlope(HycoFE fe, PetscInt cell, const PetscReal by[6], PetscReal factor,
-                                    PetscReal slope[])
+PetscErrorCode HycoFEAddStressDerivatives(HycoFE fe, PetscInt cell, const PetscReal by[6], PetscReal factor,
+                                          PetscReal slope[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
   const PetscInt size = fe->tangent_size[fe->mesh->cell_body[cell]];

@@ -7,7 +7,7 @@
 #include <string.h>
 
 /* The representative node of the part connected to i; part leads to it. Path halving keeps the trees flat. */
-static PetscInt Root(PetscInt part[], PetscInt i)
+static PetscInt SupportsRoot(PetscInt part[], PetscInt i)
 {
   while (part[i] != i) {
     part[i] = part[part[i]];
@@ -55,19 +55,19 @@ static PetscErrorCode FindParts(MPI_Comm comm, HycoMesh m, PetscInt part[], Pets
   PetscFunctionBegin;
   for (PetscInt i = 0; i < m->n_nodes; i++) part[i] = i;
   for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
-    const PetscInt a = Root(part, m->cells[k]), b = Root(part, m->cells[k - k % m->nv]);
+    const PetscInt a = SupportsRoot(part, m->cells[k]), b = SupportsRoot(part, m->cells[k - k % m->nv]);
 
     /* The smaller root wins: a representative precedes all nodes of its part, on which the numbering below relies. */
     part[PetscMax(a, b)] = PetscMin(a, b);
   }
   for (PetscInt k = 0; k < m->n_tied; k++) {
     for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++) {
-      const PetscInt a = Root(part, m->tied[k]), b = Root(part, m->tied_master[j]);
+      const PetscInt a = SupportsRoot(part, m->tied[k]), b = SupportsRoot(part, m->tied_master[j]);
 
       part[PetscMax(a, b)] = PetscMin(a, b);
     }
   }
-  for (PetscInt i = 0; i < m->n_nodes; i++) part[i] = Root(part, i);
+  for (PetscInt i = 0; i < m->n_nodes; i++) part[i] = SupportsRoot(part, i);
   PetscCall(PetscMalloc2(m->n_nodes, &label, m->n_nodes, &number));
   for (PetscInt i = 0; i < m->n_nodes; i++) { /* representatives come first */
     if (part[i] == i) label[n] = m->node_global ? m->node_whole[i] : i;
@@ -92,7 +92,7 @@ typedef struct {
 } Sum;
 
 /* Error-free addition (two-sum) of the high part; the error goes to the low part. */
-static void Add(Sum *s, PetscReal value)
+static void SupportsAdd(Sum *s, PetscReal value)
 {
   const PetscReal sum = s->high + value, part = sum - s->high;
 
@@ -108,13 +108,13 @@ static void AddSums(void *in, void *inout, PetscMPIInt *n, MPI_Datatype *type)
 
   (void)type;
   for (PetscMPIInt k = 0; k < *n; k++) {
-    Add(&to[k], from[k].high);
-    Add(&to[k], from[k].low);
+    SupportsAdd(&to[k], from[k].high);
+    SupportsAdd(&to[k], from[k].low);
   }
 }
 
 /* The sums over all processes, in `high`, identical on each. Collective. */
-static PetscErrorCode Total(MPI_Comm comm, PetscInt n, Sum sum[])
+static PetscErrorCode SupportsTotal(MPI_Comm comm, PetscInt n, Sum sum[])
 {
   MPI_Datatype type;
   MPI_Op op;
@@ -174,7 +174,7 @@ PetscReal HycoRigidAt(const HycoRigid *r, PetscInt dim, const PetscReal x[3], Pe
 
 /* "body pellet from moving along (0, 0, 1)", or from turning about an axis through a point; a motion whose axis is
    twenty lengths away is named as a translation. `others`: bodies that move with it. */
-static void Name(HycoFE fe, const HycoRigid *r, const char others[], char name[HYCO_LINE])
+static void SupportsName(HycoFE fe, const HycoRigid *r, const char others[], char name[HYCO_LINE])
 {
   const PetscReal *w = fe->dim == 3 ? r->rigid + 3 : NULL;
   PetscReal t[3] = {0, 0, 0}, omega[3] = {0, 0, fe->dim == 2 ? r->rigid[2] : 0}, at[3], move = 0, turn = 0, size = 0,
@@ -252,11 +252,12 @@ void HycoMotionsName(HycoFE fe, const HycoMotions *motions, const PetscReal coef
     strcat(others, fe->scene->body[r.body].name);
   }
   if (others[0]) strcat(others, ")");
-  Name(fe, &best, others, name);
+  SupportsName(fe, &best, others, name);
 }
 
 /* The product of two motions, over all unknowns. Collective. */
-static PetscErrorCode Product(MPI_Comm comm, HycoFE fe, const PetscReal a[], const PetscReal b[], PetscReal *dot)
+static PetscErrorCode SupportsProduct(MPI_Comm comm, HycoFE fe, const PetscReal a[], const PetscReal b[],
+                                      PetscReal *dot)
 {
   PetscFunctionBegin;
   *dot = 0;
@@ -302,14 +303,14 @@ static PetscErrorCode AddMotion(MPI_Comm comm, HycoFE fe, const PetscInt part[],
     const PetscReal *w = motions->motion + (size_t)j * (size_t)n;
 
     /* Eigenvectors are orthogonal in the coefficients, not over the nodes. */
-    PetscCall(Product(comm, fe, u, w, &dot));
+    PetscCall(SupportsProduct(comm, fe, u, w, &dot));
     for (PetscInt i = 0; i < n; i++) u[i] -= dot * w[i];
     for (PetscInt i = 0; i < 6; i++) own->rigid[i] -= dot * motions->rigid[j].rigid[i];
   }
-  PetscCall(Product(comm, fe, u, u, &norm));
+  PetscCall(SupportsProduct(comm, fe, u, u, &norm));
   for (PetscInt i = 0; i < n; i++) u[i] /= PetscSqrtReal(norm);
   for (PetscInt i = 0; i < 6; i++) own->rigid[i] /= PetscSqrtReal(norm);
-  Name(fe, own, "", motions->name[k]);
+  SupportsName(fe, own, "", motions->name[k]);
   motions->n++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -350,11 +351,11 @@ static PetscErrorCode PlaceParts(MPI_Comm comm, HycoFE fe, const PetscInt part[]
     if (HycoMeshOwned(m, i) < 0) continue;
     /* The node's place first, then the body: one maximum gives the body of the last node. */
     last[part[i]] = PetscMax(last[part[i]], node * n_bodies + m->node_body[i]);
-    Add(&sum[4 * part[i]], 1);
-    for (PetscInt c = 0; c < 3; c++) Add(&sum[4 * part[i] + 1 + c], fe->X[3 * i + c]);
+    SupportsAdd(&sum[4 * part[i]], 1);
+    for (PetscInt c = 0; c < 3; c++) SupportsAdd(&sum[4 * part[i] + 1 + c], fe->X[3 * i + c]);
   }
   HycoAllreduce(last, n_parts, MPIU_INT64, MPI_MAX, comm);
-  PetscCall(Total(comm, 4 * n_parts, sum));
+  PetscCall(SupportsTotal(comm, 4 * n_parts, sum));
   for (PetscInt p = 0; p < n_parts; p++) {
     if (!(sum[4 * p].high > 0)) continue; /* of a part of the mesh */
     parts[p].body = (PetscInt)(last[p] % n_bodies);
@@ -378,8 +379,8 @@ typedef struct {
   Sum *sum;
 } SpringGram;
 
-/* Adds a spring's energy on the part's rigid motions to its Gram matrix, with K scaled to 1: only which motions it holds
-   matters here, not how stiff it is. Sums have twice the precision, so that their order does not matter. */
+/* Adds a spring's energy on the part's rigid motions to its Gram matrix, with K scaled to 1: only which motions it
+   holds matters here, not how stiff it is. Sums have twice the precision, so that their order does not matter. */
 static PetscErrorCode AddSpring(HycoFE fe, PetscInt spring, PetscInt n, const PetscInt node[], const PetscReal K[],
                                 void *ctx)
 {
@@ -401,8 +402,8 @@ static PetscErrorCode AddSpring(HycoFE fe, PetscInt spring, PetscInt n, const Pe
   }
   for (PetscInt k = 0; k < size * size && most > 0; k++) {
     for (PetscInt a = 0; a < n_rigid * n_rigid; a++)
-      Add(&g->sum[36 * which + a / n_rigid * 6 + a % n_rigid],
-          K[k] / most * row[k / size][a / n_rigid] * row[k % size][a % n_rigid]);
+      SupportsAdd(&g->sum[36 * which + a / n_rigid * 6 + a % n_rigid],
+                  K[k] / most * row[k / size][a / n_rigid] * row[k % size][a % n_rigid]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -435,11 +436,11 @@ static PetscErrorCode MeasureParts(MPI_Comm comm, HycoFE fe, PetscBool springs, 
       HycoRigidRow(fe->dim, x, d, other);
       for (PetscInt a = 0; a < n; a++) row[a] -= oblique->a[d] * other[a];
     }
-    for (PetscInt a = 0; a < n * n; a++) Add(&sum[36 * part[i] + a / n * 6 + a % n], row[a / n] * row[a % n]);
+    for (PetscInt a = 0; a < n * n; a++) SupportsAdd(&sum[36 * part[i] + a / n * 6 + a % n], row[a / n] * row[a % n]);
   }
   ctx = (SpringGram){part, parts, sum};
   if (springs) PetscCall(HycoSpringsVisit(fe, AddSpring, &ctx));
-  PetscCall(Total(comm, 36 * n_parts, sum));
+  PetscCall(SupportsTotal(comm, 36 * n_parts, sum));
   for (PetscInt k = 0; k < 36 * n_parts; k++) parts[k / 36].gram[k % 36 / 6][k % 6] = sum[k].high;
   for (PetscInt p = 0; p < n_parts && fe->formulation == HYCO_AXISYMMETRIC; p++) /* a motion along the axis is the
                                                                                     only rigid one */

@@ -32,7 +32,7 @@ typedef struct {
 } Batch;
 
 /* Tangents of the batch's cells. */
-static PetscErrorCode Update(HycoFE fe, Batch *b)
+static PetscErrorCode TangentsUpdate(HycoFE fe, Batch *b)
 {
   HycoMesh m = fe->mesh;
   const HycoElement *el = HycoElementGet(m->type);
@@ -63,10 +63,10 @@ static PetscErrorCode UpdateAll(HycoFE fe, PetscBool all, const PetscBool same[]
   for (PetscInt e = 0; e < m->n_cells; e++) {
     /* Neither nodes nor law change: the tangents of the call before stay. */
     if (!all && (fe->constant[e] || same[m->cell_body[e]])) continue;
-    if (b->n == BATCH || (b->n && m->cell_body[e] != m->cell_body[b->cell[0]])) PetscCall(Update(fe, b));
+    if (b->n == BATCH || (b->n && m->cell_body[e] != m->cell_body[b->cell[0]])) PetscCall(TangentsUpdate(fe, b));
     b->cell[b->n++] = e;
   }
-  PetscCall(Update(fe, b));
+  PetscCall(TangentsUpdate(fe, b));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -98,7 +98,7 @@ PetscErrorCode HycoTiedCheckOblique(HycoFE fe, const HycoFixed *fixed, PetscInt 
 }
 
 /* Extends a matrix of n rows to `to` > n rows; the new rows and columns are 0. */
-static void Grow(PetscInt n, PetscInt to, PetscReal Ke[])
+static void TiedGrow(PetscInt n, PetscInt to, PetscReal Ke[])
 {
   for (PetscInt r = to - 1; r >= 0; r--) {
     for (PetscInt t = to - 1; t >= 0; t--) Ke[r * to + t] = r < n && t < n ? Ke[r * n + t] : 0;
@@ -116,7 +116,7 @@ void HycoTiedStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
   if (!m->ties) return;
   own = HycoMeshOwnNodes(m, cell, node);
   n = HycoMeshCellNodes(m, cell, node);
-  if (n > own) Grow(own * dim, n * dim, Ke);
+  if (n > own) TiedGrow(own * dim, n * dim, Ke);
   for (PetscInt a = 0; a < own && !fe->plain; a++) {
     const PetscInt k = HycoMeshTied(m, node[a]), size = n * dim;
 

@@ -13,7 +13,7 @@
 
 /* The largest displacement relative to the mesh's longest side, or to the largest prescribed displacement if that is
    more. Collective. Moved positions, since a map may scale the mesh; components of all ranks in one reduction. */
-static PetscErrorCode Relative(HycoFOM f, const PetscReal u[], PetscReal *relative)
+static PetscErrorCode AcceptanceRelative(HycoFOM f, const PetscReal u[], PetscReal *relative)
 {
   const PetscInt dim = f->fe->dim;
   PetscReal most[8], extent; /* of the coordinates, of their negatives, prescribed, found */
@@ -90,8 +90,8 @@ PetscErrorCode HycoFOMMoveClosed(HycoFOM f, PetscInt p, const Vec v[], Vec w[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* gram (p x p): of the rows of B with a force, times the motions v; *size as above. Motions that these rows resist are held
-   by contact; the others could go on for ever. */
+/* gram (p x p): of the rows of B with a force, times the motions v; *size as above. Motions that these rows resist are
+   held by contact; the others could go on for ever. */
 static PetscErrorCode HeldBy(HycoFOM f, PetscInt p, const Vec v[], PetscReal gram[], PetscReal *size)
 {
   Vec *w;
@@ -106,7 +106,7 @@ static PetscErrorCode HeldBy(HycoFOM f, PetscInt p, const Vec v[], PetscReal gra
 
 /* Names a rigid motion that the closed contacts with a force do not resist: the solution is one of several. name is
    "" if there is none. A Gram matrix of the size of the null space decides. Collective. */
-PetscErrorCode HycoFOMNameLoose(HycoFOM f, char name[HYCO_LINE])
+PetscErrorCode HycoFOMNameFreeMotion(HycoFOM f, char name[HYCO_LINE])
 {
   HycoMotions motions;
   PetscReal *gram, *value, *work, size;
@@ -145,7 +145,7 @@ PetscErrorCode HycoFOMJudge(HycoFOM f, const PetscReal u[], Vec L, PetscReal ene
   char name[HYCO_LINE];
 
   PetscFunctionBegin;
-  PetscCall(Relative(f, u, relative));
+  PetscCall(AcceptanceRelative(f, u, relative));
   /* Written so that NaN diverges. */
   if (*reason > 0 && !(*relative <= HYCO_MOST))
     *reason = HYCO_DIVERGED_DISPLACEMENT;
@@ -156,8 +156,8 @@ PetscErrorCode HycoFOMJudge(HycoFOM f, const PetscReal u[], Vec L, PetscReal ene
     PetscCall(NameLifted(f, f->path ? f->path->Bt : f->Bt, L, name));
   if (*reason == HYCO_DIVERGED_FLOATING && name[0])
     HycoFormat(why, "%s; no support keeps %s",
-               f->path && f->path->rubs ? "not converged: no contact forces with this friction balance the load"
-                                        : HycoReasonName(*reason),
+               f->path && f->path->has_friction ? "not converged: no contact forces with this friction balance the load"
+                                                : HycoReasonName(*reason),
                name);
   if (*reason == HYCO_DIVERGED_DISPLACEMENT)
     HycoFormat(why, "%s (%.1e times the mesh's extent)", HycoReasonName(*reason), (double)*relative);
@@ -167,19 +167,19 @@ PetscErrorCode HycoFOMJudge(HycoFOM f, const PetscReal u[], Vec L, PetscReal ene
 }
 
 /* Of the system just assembled, without a solve; with friction it is not decided. Collective. */
-PetscErrorCode HycoFOMLifts(HycoFOM f, char why[HYCO_LINE])
+PetscErrorCode HycoFOMLiftOff(HycoFOM f, char why[HYCO_LINE])
 {
   char name[HYCO_LINE];
-  PetscBool lifts = PETSC_FALSE;
+  PetscBool lift_off = PETSC_FALSE;
   Vec L;
 
   PetscFunctionBegin;
   why[0] = '\0';
   if (!f->n_contacts || HycoSceneHasFriction(f->scene)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(f->Lambda, &L));
-  PetscCall(HycoSystemLifts(f->system, L, &lifts));
-  if (lifts) PetscCall(NameLifted(f, f->Bt, L, name));
-  if (lifts)
+  PetscCall(HycoSystemLiftOff(f->system, L, &lift_off));
+  if (lift_off) PetscCall(NameLifted(f, f->Bt, L, name));
+  if (lift_off)
     HycoFormat(why, "%s%s%s", HycoReasonName(HYCO_DIVERGED_FLOATING), name[0] ? "; no support keeps " : "", name);
   PetscCall(VecDestroy(&L));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -108,7 +108,7 @@ static PetscErrorCode StateCols(HycoFOM f, PetscInt *cols)
 
 /* Identifies the scene and the point of a checkpoint. Scene, mesh, point and outputs: a checkpoint of another one
    would resume silently wrong. */
-static PetscErrorCode Identify(HycoFOM f, char text[HYCO_LINE])
+static PetscErrorCode CheckpointIdentify(HycoFOM f, char text[HYCO_LINE])
 {
   HycoScene scene = f->scene;
   unsigned long long hash;
@@ -211,7 +211,7 @@ static void MoveHead(HycoPath p, PetscBool out, PetscReal head[])
   }
 }
 
-/* The data of a checkpoint except nodes and cells: on rank 0; after Spread() on all, without the forces. */
+/* The data of a checkpoint except nodes and cells: on rank 0; after CheckpointSpread() on all, without the forces. */
 typedef struct {
   PetscReal *lambda, *head, *steps, *orders, *taken; /* taken: none in older files */
   PetscInt cell_cols, n_steps, n_orders, n_taken;
@@ -330,7 +330,7 @@ PetscErrorCode HycoPathSave(HycoFOM f)
   PetscFunctionBegin;
   if (!p->checkpoint[0]) PetscFunctionReturn(PETSC_SUCCESS);
   /* Collective: the fingerprint reads the mesh's numbers of all ranks. */
-  PetscCall(Identify(f, key));
+  PetscCall(CheckpointIdentify(f, key));
   PetscCall(PetscMalloc1(N_HEAD, &c.head));
   MoveHead(p, PETSC_TRUE, c.head);
   PetscCall(PetscMalloc1((p->n_steps + 1) * STEP_COLS(f), &c.steps));
@@ -419,7 +419,7 @@ static PetscErrorCode ReadContent(HycoFOM f, const char key[], Content *c)
 }
 
 /* Sends n reals of rank 0 to every rank. */
-static PetscErrorCode Spread(HycoFOM f, PetscInt n, PetscReal **array)
+static PetscErrorCode CheckpointSpread(HycoFOM f, PetscInt n, PetscReal **array)
 {
   PetscMPIInt count;
 
@@ -441,11 +441,11 @@ static PetscErrorCode SpreadContent(HycoFOM f, Content *c)
   c->n_steps = size[1];
   c->n_orders = size[2];
   c->n_taken = size[3];
-  PetscCall(Spread(f, N_HEAD, &c->head));
-  PetscCall(Spread(f, (c->n_steps + 1) * STEP_COLS(f), &c->steps));
+  PetscCall(CheckpointSpread(f, N_HEAD, &c->head));
+  PetscCall(CheckpointSpread(f, (c->n_steps + 1) * STEP_COLS(f), &c->steps));
   /* Empty arrays are not in the file. */
-  if (c->n_orders) PetscCall(Spread(f, c->n_orders, &c->orders));
-  if (c->n_taken) PetscCall(Spread(f, c->n_taken, &c->taken));
+  if (c->n_orders) PetscCall(CheckpointSpread(f, c->n_orders, &c->orders));
+  if (c->n_taken) PetscCall(CheckpointSpread(f, c->n_taken, &c->taken));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -530,7 +530,7 @@ PetscErrorCode HycoPathLoad(HycoFOM f)
              "-hyco_resume needs a checkpoint; name it by -hyco_checkpoint FILE.h5");
   PetscCallMPI(MPI_Bcast(&there, 1, MPIU_INT, 0, HycoComm(f)));
   if (!there) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Identify(f, key));
+  PetscCall(CheckpointIdentify(f, key));
   HycoOnRoot(HycoComm(f), ReadContent(f, key, &c));
   PetscCall(SpreadContent(f, &c));
   PetscCall(TakeContent(f, &c));

@@ -82,7 +82,7 @@ typedef struct {
 } Sent;
 
 /* The pieces of a contact. */
-static PetscInt Pieces(const HycoPairs *p, PetscInt k)
+static PetscInt FOMContactsPieces(const HycoPairs *p, PetscInt k)
 {
   const PetscInt masters = p->master_start[k + 1] - p->master_start[k];
 
@@ -94,11 +94,11 @@ static PetscErrorCode PackContacts(HycoMesh m, const HycoPairs *p, PetscInt *n, 
 {
   PetscFunctionBegin;
   *n = 0;
-  for (PetscInt k = 0; k < p->n; k++) *n += Pieces(p, k);
+  for (PetscInt k = 0; k < p->n; k++) *n += FOMContactsPieces(p, k);
   PetscCall(PetscCalloc1(*n, sent));
   *n = 0;
   for (PetscInt k = 0; k < p->n; k++) {
-    for (PetscInt i = 0, lo = p->master_start[k]; i < Pieces(p, k); i++, lo += HYCO_FACET_NODES) {
+    for (PetscInt i = 0, lo = p->master_start[k]; i < FOMContactsPieces(p, k); i++, lo += HYCO_FACET_NODES) {
       Sent *s = &(*sent)[(*n)++];
 
       s->contact = p->contact[k];
@@ -123,7 +123,8 @@ typedef struct {
   PetscInt n, *global, *node;
 } Places;
 
-/* Local nodes sorted by their global numbers, for binary search. A table by global number would have the length of the whole mesh on each rank. */
+/* Local nodes sorted by their global numbers, for binary search. A table by global number would have the length of the
+   whole mesh on each rank. */
 static PetscErrorCode PlacesCreate(HycoMesh m, Places *p)
 {
   PetscFunctionBegin;
@@ -182,7 +183,8 @@ PetscErrorCode HycoFOMGatherSurface(HycoFOM f, HycoMesh *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sorts contacts by their numbers and makes them those of the whole surfaces; the pieces of one are together. Rank 0. */
+/* Sorts contacts by their numbers and makes them those of the whole surfaces; the pieces of one are together. Rank
+   0. */
 static PetscErrorCode PlaceGathered(HycoFOM f, HycoMesh mesh, PetscInt n, const Sent sent[], HycoPairs *p)
 {
   PetscInt *place;
@@ -290,7 +292,8 @@ static PetscErrorCode FindOnRoot(HycoFOM f, const HycoSurfaceFacts facts[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The numbers of the contacts in the order of the scene's contacts, then of the slaves' tags and sides. Keys of these: the numbers do not depend on the partition. */
+/* The numbers of the contacts in the order of the scene's contacts, then of the slaves' tags and sides. Keys of these:
+   the numbers do not depend on the partition. */
 static PetscErrorCode NumberContacts(HycoFOM f)
 {
   HycoPairs *p = &f->pairs;
@@ -312,7 +315,7 @@ static PetscErrorCode NumberContacts(HycoFOM f)
 
 /* Searches on this rank, and notes whether it has found its contacts. A rank's error must not be raised here: its
    text may differ from that on one rank. */
-static PetscErrorCode Try(HycoFOM f, const HycoSurfaceFacts facts[], PetscBool *found)
+static PetscErrorCode FOMContactsTry(HycoFOM f, const HycoSurfaceFacts facts[], PetscBool *found)
 {
   char message[HYCO_LINE];
   PetscErrorCode ierr;
@@ -325,7 +328,7 @@ static PetscErrorCode Try(HycoFOM f, const HycoSurfaceFacts facts[], PetscBool *
 
 /* Finds the contacts with the facets that the drawn positions need. A search on each rank; rank 0 repeats it if a
    rank fails or if what the ranks have found does not fit together. Collective. */
-static PetscErrorCode Search(HycoFOM f, HycoSurfaceFacts facts[])
+static PetscErrorCode FOMContactsSearch(HycoFOM f, HycoSurfaceFacts facts[])
 {
   PetscInt n, *near;
   PetscBool found, agreed = PETSC_FALSE, moved = PETSC_FALSE;
@@ -339,9 +342,9 @@ static PetscErrorCode Search(HycoFOM f, HycoSurfaceFacts facts[])
   PetscCall(AddNeeded(f, n, near));
   PetscCall(PetscFree(near));
   PetscCall(FetchSurface(f, &f->surface));
-  PetscCall(Try(f, facts, &found));
+  PetscCall(FOMContactsTry(f, facts, &found));
   HycoAllreduce(&found, 1, HYCO_MPI_BOOL, MPI_LAND, HycoComm(f));
-  if (found) PetscCall(HycoContactsAgree(HycoComm(f), f->scene, f->part, f->surface, &f->pairs, &agreed));
+  if (found) PetscCall(HycoContactsSynchronise(HycoComm(f), f->scene, f->part, f->surface, &f->pairs, &agreed));
   if (!agreed) PetscCall(FindOnRoot(f, facts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -383,7 +386,8 @@ static PetscErrorCode FindContacts(HycoFOM f)
   PetscCall(HycoFESetDrawn(f->fe));
   PetscCall(PetscMalloc1(f->scene->n_contacts, &facts));
   PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_TRUE));
-  HycoFinally(Search(f, facts), PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_FALSE)); PetscCall(PetscFree(facts)));
+  HycoFinally(FOMContactsSearch(f, facts), PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_FALSE));
+              PetscCall(PetscFree(facts)));
   PetscCall(NumberContacts(f));
   PetscCall(CountPatches(f));
   f->width = HycoPairsWidth(&f->pairs);
@@ -422,7 +426,7 @@ static PetscBool HasNeeded(HycoFOM f, PetscInt n, const PetscInt node[])
 
 /* Replaces the surfaces by those with more facets, and what depends on their nodes. Contacts keep their order, and
    thus the rows of B and Lambda. */
-static PetscErrorCode Renew(HycoFOM f)
+static PetscErrorCode FOMContactsRenew(HycoFOM f)
 {
   HycoMesh before = f->surface;
   HycoPairs renumbered;
@@ -466,7 +470,7 @@ static PetscErrorCode FetchMasters(HycoFOM f)
   PetscCall(HycoContactsCandidates(HycoComm(f), f->fe, SLACK, &n, &near));
   PetscCall(AddNeeded(f, n, near));
   PetscCall(PetscFree(near));
-  PetscCall(Renew(f));
+  PetscCall(FOMContactsRenew(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -7,7 +7,8 @@
   0.5 /* share of that difference which remains at a quarter of the step, where curvature leaves a quarter */
 #define ROUND 1e-9 /* share of a value below which a difference may be round-off */
 #define NOISE                                                                                                          \
-  3e-13 /* share of a value below which its change over a step is round-off: as a derivative 1e-8 of it over the range */
+  3e-13 /* share of a value below which its change over a step is round-off: as a derivative 1e-8 of it over the
+           range */
 #define NOTHING                                                                                                        \
   1e-8 /* share of the largest value on a path below which one is round-off, as is a change over the range */
 
@@ -62,7 +63,7 @@ void HycoDifferenceShrink(HycoDifference *d)
 }
 
 /* The slopes to the two sides, or of the two parts of a one-sided difference. */
-static void Slopes(const HycoDifference *d, const PetscReal v[3], PetscReal slope[2])
+static void DifferenceQuotients(const HycoDifference *d, const PetscReal v[3], PetscReal slope[2])
 {
   const PetscReal *s = d->step;
 
@@ -76,7 +77,7 @@ PetscReal HycoDifferenceJump(const HycoDifference *d, PetscReal size, PetscReal 
 {
   PetscReal s[2], jump;
 
-  Slopes(d, v, s);
+  DifferenceQuotients(d, v, s);
   jump = PetscAbsReal(s[0] - s[1]);
   if (slope <= 0) slope = PetscMax(PetscAbsReal(s[0]), PetscAbsReal(s[1]));
   return jump > KINK * slope && jump * PetscAbsReal(d->step[1]) > ROUND * size ? jump : 0;
@@ -89,7 +90,7 @@ PetscBool HycoDifferenceKinks(const HycoDifference *d, PetscReal jump, const Pet
   PetscReal s[2];
 
   HycoDifferenceShrink(&near);
-  Slopes(&near, closer, s);
+  DifferenceQuotients(&near, closer, s);
   return (PetscBool)(jump > 0 && PetscAbsReal(s[0] - s[1]) > STAYS * jump);
 }
 
@@ -127,7 +128,7 @@ PetscErrorCode HycoGradientDestroy(HycoGradientStore *store)
 }
 
 /* The jump of the slopes of output q. */
-static PetscReal Jump(const HycoGradient *g, const HycoDifference *d, const PetscReal value[], PetscInt q)
+static PetscReal DifferencesJump(const HycoGradient *g, const HycoDifference *d, const PetscReal value[], PetscInt q)
 {
   const PetscReal v[3] = {value[q], value[g->n_outputs + q], value[2 * g->n_outputs + q]};
 
@@ -135,8 +136,8 @@ static PetscReal Jump(const HycoGradient *g, const HycoDifference *d, const Pets
 }
 
 /* The derivative of output q from the values at the points of d. */
-static void Set(HycoGradient *g, HycoGradientStore *store, const HycoDifference *d, const PetscReal value[], PetscInt q,
-                PetscBool kink, PetscBool turns)
+static void DifferencesSet(HycoGradient *g, HycoGradientStore *store, const HycoDifference *d, const PetscReal value[],
+                           PetscInt q, PetscBool kink, PetscBool turns)
 {
   const PetscInt at = q * g->n_parameters + d->parameter;
   HycoDifference side = *d;
@@ -151,8 +152,8 @@ static void Set(HycoGradient *g, HycoGradientStore *store, const HycoDifference 
 }
 
 /* The n outputs at the two points beside mu. */
-static PetscErrorCode MeasureBeside(PetscInt n, HycoScene scene, const PetscReal mu[], const HycoDifference *d,
-                                    HycoGradientMeasure measure, void *context, PetscReal value[])
+static PetscErrorCode MeasurePerturbed(PetscInt n, HycoScene scene, const PetscReal mu[], const HycoDifference *d,
+                                       HycoGradientMeasure measure, void *context, PetscReal value[])
 {
   PetscReal at[HYCO_MAX_PARAMETERS];
 
@@ -165,7 +166,8 @@ static PetscErrorCode MeasureBeside(PetscInt n, HycoScene scene, const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Outputs that are round-off at a time of a path, as stresses of bodies without loads, have no derivative, and no kink. */
+/* Outputs that are round-off at a time of a path, as stresses of bodies without loads, have no derivative, and no
+   kink. */
 static void DropRounding(const HycoGradient *g, HycoGradientStore *store, HycoScene s, PetscInt p,
                          const PetscReal value[])
 {
@@ -181,8 +183,8 @@ static void DropRounding(const HycoGradient *g, HycoGradientStore *store, HycoSc
   }
 }
 
-/* Closer differences only of outputs whose slopes jump: they tell a kink from curvature, and are of one side of a kink that
-   lies between their points and the farther ones. */
+/* Closer differences only of outputs whose slopes jump: they tell a kink from curvature, and are of one side of a kink
+   that lies between their points and the farther ones. */
 PetscErrorCode HycoGradientColumn(HycoGradient *g, HycoGradientStore *store, HycoScene scene, const PetscReal mu[],
                                   const HycoDifference *d, PetscBool kink, HycoGradientMeasure measure, void *context,
                                   PetscReal value[])
@@ -194,10 +196,10 @@ PetscErrorCode HycoGradientColumn(HycoGradient *g, HycoGradientStore *store, Hyc
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(MeasureBeside(n, scene, mu, d, measure, context, value));
+  PetscCall(MeasurePerturbed(n, scene, mu, d, measure, context, value));
   PetscCall(PetscMalloc1(n + 1, &jump));
   for (PetscInt q = 0; q < n; q++) {
-    Set(g, store, d, value, q, kink, PETSC_FALSE);
+    DifferencesSet(g, store, d, value, q, kink, PETSC_FALSE);
     jump[q] = 1;
   }
   /* Of a path each closer difference is two paths more. */
@@ -206,19 +208,19 @@ PetscErrorCode HycoGradientColumn(HycoGradient *g, HycoGradientStore *store, Hyc
     PetscBool any = PETSC_FALSE;
 
     for (PetscInt q = 0; q < n; q++) {
-      if (jump[q] > 0) jump[q] = Jump(g, &at, value, q);
+      if (jump[q] > 0) jump[q] = DifferencesJump(g, &at, value, q);
       any = (PetscBool)(any || jump[q] > 0);
     }
     if (!any) break;
     HycoDifferenceShrink(&near);
     for (PetscInt q = 0; q < n; q++) closer[q] = value[q];
-    ierr = MeasureBeside(n, scene, mu, &near, measure, context, closer);
+    ierr = MeasurePerturbed(n, scene, mu, &near, measure, context, closer);
     if (ierr) PetscCall(PetscFree(jump));
     PetscCall(ierr);
     for (PetscInt q = 0; q < n; q++) {
       const PetscReal v[3] = {closer[q], closer[n + q], closer[2 * n + q]};
 
-      if (jump[q] > 0) Set(g, store, &near, closer, q, kink, HycoDifferenceKinks(&at, jump[q], v));
+      if (jump[q] > 0) DifferencesSet(g, store, &near, closer, q, kink, HycoDifferenceKinks(&at, jump[q], v));
     }
     for (PetscInt q = n; q < 3 * n; q++) value[q] = closer[q];
     at = near;
@@ -246,7 +248,7 @@ typedef struct {
 
 /* A path beside this one that chooses other steps has another error in time: the difference would be that of the
    steps, divided by a small number. */
-PetscErrorCode HycoPathCheckBeside(PetscBool ended, PetscInt cuts, const char why[])
+PetscErrorCode HycoPathCheckPerturbed(PetscBool ended, PetscInt cuts, const char why[])
 {
   PetscFunctionBegin;
   HycoCheck(ended && !cuts,
@@ -256,7 +258,7 @@ PetscErrorCode HycoPathCheckBeside(PetscBool ended, PetscInt cuts, const char wh
 }
 
 /* The outputs at all listed times, then their extremes. */
-static void Gather(HycoScene scene, const HycoStep step[], PetscReal output[])
+static void DifferencesGather(HycoScene scene, const HycoStep step[], PetscReal output[])
 {
   const PetscInt n = scene->n_quantities;
 
@@ -275,12 +277,12 @@ static PetscErrorCode MeasurePath(void *context, const PetscReal mu[], PetscReal
   PetscFunctionBegin;
   (void)step;
   PetscCall((*b->follow)(b->context, mu, &steps));
-  Gather(b->scene, steps, output);
+  DifferencesGather(b->scene, steps, output);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The steps in time stay those of the solution: with steps that each path chooses, outputs would jump along a parameter.
-   Newton's tolerance is small beside the difference of the paths. */
+/* The steps in time stay those of the solution: with steps that each path chooses, outputs would jump along a
+   parameter. Newton's tolerance is small beside the difference of the paths. */
 PetscErrorCode HycoGradientOfPath(HycoScene scene, const PetscReal mu[], const HycoStep step[],
                                   HycoGradientStore *store, HycoGradient *g, HycoGradientFollow follow, void *context)
 {
@@ -296,7 +298,7 @@ PetscErrorCode HycoGradientOfPath(HycoScene scene, const PetscReal mu[], const H
   all.n_outputs *= scene->n_times + 1;
   /* At mu, and at the points of a difference with one closer step. */
   PetscCall(PetscCalloc1(6 * all.n_outputs + 1, &value));
-  Gather(scene, step, value);
+  DifferencesGather(scene, step, value);
   for (PetscInt p = 0; p < g->n_parameters && !ierr; p++) {
     HycoDifference d;
 
@@ -309,7 +311,7 @@ PetscErrorCode HycoGradientOfPath(HycoScene scene, const PetscReal mu[], const H
 }
 
 /* Whether v is an extreme as `most` is, but for round-off. */
-static PetscBool Ties(const HycoQuantity *of, PetscReal v, PetscReal most)
+static PetscBool DifferencesIsExtreme(const HycoQuantity *of, PetscReal v, PetscReal most)
 {
   const PetscReal room = HYCO_GRADIENT_FORCE * PetscAbsReal(most);
 
@@ -330,7 +332,7 @@ static void SetExtreme(HycoScene scene, const HycoStep step[], const HycoDiffere
     /* Equal values, so that slopes alone decide. */
     const PetscReal moved = (v < 0 ? -size : size) + d->step[1] * store->value[k * n + at];
 
-    if (!Ties(of, v, most)) continue;
+    if (!DifferencesIsExtreme(of, v, most)) continue;
     slope = PetscMax(slope, PetscAbsReal(store->value[k * n + at]));
     if (chosen >= 0 && !HycoPathIsBeyond(of, moved, beside)) continue;
     chosen = k;
@@ -341,7 +343,7 @@ static void SetExtreme(HycoScene scene, const HycoStep step[], const HycoDiffere
   store->value[g->n_times * n + at] = store->value[chosen * n + at];
   store->kink[g->n_times * n + at] = store->kink[chosen * n + at];
   for (PetscInt k = 0; k < g->n_times; k++) {
-    if (Ties(of, step[k].quantity[q], most) &&
+    if (DifferencesIsExtreme(of, step[k].quantity[q], most) &&
         PetscAbsReal(store->value[k * n + at] - store->value[chosen * n + at]) > KINK * slope)
       store->kink[g->n_times * n + at] = PETSC_TRUE;
   }

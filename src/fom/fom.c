@@ -38,7 +38,7 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
 }
 
 /* Partitions the DM so that few contacts are cut; contacts' pairs become heavy edges of the graph. */
-static PetscErrorCode Distribute(HycoFOM f)
+static PetscErrorCode FOMDistribute(HycoFOM f)
 {
   const HycoPartitioner cut = (HycoPartitioner)f->partition;
   PetscInt n = 0, *pairs = NULL;
@@ -55,7 +55,7 @@ static PetscErrorCode Distribute(HycoFOM f)
   /* the file's first bad cell is named; refined cells are checked later */
   if (!f->scene->refine) HycoOnEach(HycoComm(f), HycoMeshCheckCells(mesh));
   if (mesh->n_cells) PetscCall(HycoContactsNeighbours(f->scene, mesh, &n, &pairs));
-  /* The tables outlive the DM, which Distribute() replaces: the partitioner needs them. */
+  /* The tables outlive the DM, which FOMDistribute() replaces: the partitioner needs them. */
   PetscCall(HycoMeshDetach(mesh)); /* so that it does not live beside the distributed one */
   PetscCall(HycoMeshDistribute(&f->dm, f->scene, mesh, n, pairs, cut, f->mesh_write));
   PetscCall(PetscFree(pairs));
@@ -69,7 +69,7 @@ static PetscErrorCode ReadMesh(HycoFOM f)
 {
   PetscFunctionBegin;
   PetscCall(HycoMeshLoad(HycoComm(f), f->scene, &f->dm));
-  PetscCall(Distribute(f));
+  PetscCall(FOMDistribute(f));
   PetscCall(HycoPlexToMesh(f->dm, f->scene, &f->part));
   /* A part knows its own nodes; the mesh has its number as a fact. */
   f->n_nodes = f->size == 1 ? f->part->n_nodes : f->part->n_whole_nodes;
@@ -187,7 +187,7 @@ static PetscErrorCode SetFromOptions(HycoFOM f)
 
 /* On defaults alone, without a scene; also for the declaration of options. Defaults of options; everything else is
    zero. */
-static PetscErrorCode Create(MPI_Comm comm, HycoFOM *fom)
+static PetscErrorCode FOMCreate(MPI_Comm comm, HycoFOM *fom)
 {
   PetscFunctionBegin;
   PetscCall(PetscHeaderCreate(*fom, HYCO_FOM_CLASSID, "HycoFOM", "Full-order model", "Hyco", comm, HycoFOMDestroy,
@@ -205,7 +205,7 @@ PetscErrorCode HycoFOMDeclare(PetscOptions options)
   HycoFOM f;
 
   PetscFunctionBegin;
-  PetscCall(Create(PETSC_COMM_SELF, &f));
+  PetscCall(FOMCreate(PETSC_COMM_SELF, &f));
   HycoDeclare(f, options, SetFromOptions, HycoFOMDestroy);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -248,7 +248,7 @@ PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   HycoCheckGiven(fom);
-  PetscCall(Create(comm, fom));
+  PetscCall(FOMCreate(comm, fom));
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*fom)->scene = scene;
   HycoOnError(SetUp(*fom), PetscCall(HycoFOMDestroy(fom)));
@@ -261,7 +261,7 @@ PetscErrorCode HycoFOMCreateMesh(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(Create(comm, fom));
+  PetscCall(FOMCreate(comm, fom));
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*fom)->scene = scene;
   PetscCall(HycoSceneGiveOptions(scene, (PetscObject)*fom));
@@ -358,7 +358,7 @@ static PetscErrorCode AllRows(HycoFOM f, HycoRows *r)
 
 /* Sets D and, if the parameters that it depends on have changed, B. Rows are set by INSERT_VALUES, as each contact
    has one row. */
-static PetscErrorCode Insert(HycoFOM f, PetscBool rows_changed, const HycoRows *r)
+static PetscErrorCode FOMInsert(HycoFOM f, PetscBool rows_changed, const HycoRows *r)
 {
   const PetscInt dim = f->part->dim;
   PetscInt *column, first;
@@ -431,7 +431,7 @@ static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
     PetscCall(MatZeroEntries(f->B));
   ierr = AllRows(f, &r); /* without contacts there may be obstacles whose nodes are all fixed */
   if (!ierr && f->n_contacts) ierr = CheckNormals(f);
-  if (!ierr && f->n_contacts) ierr = Insert(f, rows_changed, &r);
+  if (!ierr && f->n_contacts) ierr = FOMInsert(f, rows_changed, &r);
   PetscCall(HycoRowsDestroy(&r));
   PetscCall(ierr);
   if (!f->n_contacts || !rows_changed) PetscFunctionReturn(PETSC_SUCCESS);

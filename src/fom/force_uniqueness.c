@@ -26,9 +26,9 @@ static void RowForces(const HycoSlip *slip, PetscInt m, const PetscReal lambda[]
   }
 }
 
-/* Marks rows of contacts whose gap is closed, and that have an unknown. The scale is of all contacts, so that round-off counts
-   equally everywhere; two passes, since it is known after the first. 1e-9 of it: a gap that the solver has left by
-   round-off is closed. */
+/* Marks rows of contacts whose gap is closed, and that have an unknown. The scale is of all contacts, so that round-off
+   counts equally everywhere; two passes, since it is known after the first. 1e-9 of it: a gap that the solver has left
+   by round-off is closed. */
 static PetscErrorCode MarkClosed(MPI_Comm comm, const HycoRows *r, const PetscReal u[], const PetscReal lambda[],
                                  const PetscBool tangent[], PetscBool in[])
 {
@@ -104,7 +104,7 @@ static PetscBool PeelOwn(const HycoRows *r, PetscReal count[], PetscBool in[])
 /* Removes repeatedly the rows with an unknown that occurs in no other row: they are independent. Exact and cheap;
    only what remains needs a dense Gram matrix. Ranks may remove rows at the same time: each counts on an unknown
    that is in no other row. */
-static PetscErrorCode Peel(HycoFOM f, const HycoRows *r, PetscBool in[])
+static PetscErrorCode ForceRankRemoveIndependent(HycoFOM f, const HycoRows *r, PetscBool in[])
 {
   PetscReal *count;
   PetscBool change = PETSC_TRUE;
@@ -121,8 +121,8 @@ static PetscErrorCode Peel(HycoFOM f, const HycoRows *r, PetscBool in[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The remaining rows of all ranks, with unknowns by their numbers in the distributed vectors, on rank 0. Collective; the
-   caller frees them. */
+/* The remaining rows of all ranks, with unknowns by their numbers in the distributed vectors, on rank 0. Collective;
+   the caller frees them. */
 static PetscErrorCode GatherRest(HycoFOM f, const HycoRows *r, const PetscBool in[], HycoRows *rest)
 {
   const PetscInt dim = f->fe->dim, *global = f->surface->node_global;
@@ -155,7 +155,7 @@ static PetscErrorCode GatherRest(HycoFOM f, const HycoRows *r, const PetscBool i
 /* The number of rows minus their rank; the unknowns are numbered anew, those that occur. Rank 0. By the Gram matrix (n
    x n, dense): n is small after peeling. Each dependent row is a direction in which contact forces are arbitrary while
    displacements are not. */
-static PetscErrorCode Dependent(const HycoRows *r, PetscInt *dependent)
+static PetscErrorCode ForceRankDependent(const HycoRows *r, PetscInt *dependent)
 {
   const PetscInt n = r->n, n_values = r->start[n];
   PetscReal *G, *full;
@@ -187,8 +187,8 @@ static PetscErrorCode Dependent(const HycoRows *r, PetscInt *dependent)
 }
 
 /* The same for the rows that are marked, on all ranks. A row without force cannot exchange it with others. */
-static PetscErrorCode CountRest(HycoFOM f, const HycoRows *r, const PetscReal lambda[], const PetscBool in[],
-                                PetscInt *dependent)
+static PetscErrorCode CountRemaining(HycoFOM f, const HycoRows *r, const PetscReal lambda[], const PetscBool in[],
+                                     PetscInt *dependent)
 {
   HycoRows rest = {0};
   PetscBool pressed = PETSC_FALSE;
@@ -200,15 +200,15 @@ static PetscErrorCode CountRest(HycoFOM f, const HycoRows *r, const PetscReal la
   /* Dependent rows without any force: forces 0 are unique. */
   if (!pressed) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(GatherRest(f, r, in, &rest));
-  HycoOnRoot(HycoComm(f), Dependent(&rest, dependent));
+  HycoOnRoot(HycoComm(f), ForceRankDependent(&rest, dependent));
   HycoFreeAll(&rest.start, &rest.dof, &rest.value);
   HycoBcast(dependent, 1, MPIU_INT, HycoComm(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Rows that share no unknown with another closed row are independent; only the rest needs a rank. */
-static PetscErrorCode Count(HycoFOM f, const HycoSlip *slip, HycoRows *r, PetscReal force[], PetscBool tangent[],
-                            PetscBool in[], PetscInt *dependent)
+static PetscErrorCode ForceRankCount(HycoFOM f, const HycoSlip *slip, HycoRows *r, PetscReal force[],
+                                     PetscBool tangent[], PetscBool in[], PetscInt *dependent)
 {
   PetscFunctionBegin;
   if (slip)
@@ -218,8 +218,8 @@ static PetscErrorCode Count(HycoFOM f, const HycoSlip *slip, HycoRows *r, PetscR
     HycoOnEach(HycoComm(f), HycoContactRows(f->fe_surface, &f->pairs, r));
   RowForces(slip, r->n, f->lambda, force, tangent);
   PetscCall(MarkClosed(HycoComm(f), r, f->u_surface, force, tangent, in));
-  PetscCall(Peel(f, r, in));
-  PetscCall(CountRest(f, r, force, in, dependent));
+  PetscCall(ForceRankRemoveIndependent(f, r, in));
+  PetscCall(CountRemaining(f, r, force, in, dependent));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -234,13 +234,13 @@ PetscErrorCode HycoFOMCountDependent(HycoFOM f, PetscInt *dependent)
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(m, &in, m, &force, m, &tangent));
-  HycoFinally(Count(f, slip, &r, force, tangent, in, dependent), PetscCall(HycoRowsDestroy(&r));
+  HycoFinally(ForceRankCount(f, slip, &r, force, tangent, in, dependent), PetscCall(HycoRowsDestroy(&r));
               PetscCall(PetscFree3(in, force, tangent)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The marked rows, which the caller frees. */
-static PetscErrorCode TakeRest(const HycoRows *r, const PetscBool in[], HycoRows *rest)
+static PetscErrorCode AcceptResidual(const HycoRows *r, const PetscBool in[], HycoRows *rest)
 {
   PetscInt n = 0;
 
@@ -283,8 +283,8 @@ PetscErrorCode HycoRowsCountDependent(const HycoRows *r, PetscInt n_dof, const P
   for (PetscInt k = 0; k < m; k++) pressed = (PetscBool)(pressed || (in[k] && force[k] > 0));
   /* Without a force nothing can be redistributed. */
   if (pressed) {
-    PetscCall(TakeRest(r, in, &rest));
-    PetscCall(Dependent(&rest, dependent));
+    PetscCall(AcceptResidual(r, in, &rest));
+    PetscCall(ForceRankDependent(&rest, dependent));
   }
   PetscCall(PetscFree3(in, force, tangent));
   HycoFreeAll(&rest.start, &rest.dof, &rest.value, &count);

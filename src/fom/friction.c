@@ -61,7 +61,7 @@ static PetscErrorCode CopyNormal(HycoFOM f, Vec from, PetscBool with, Vec to)
 }
 
 /* Gives the path the system with or without tangents. Of the forces at hand it keeps the normal ones. */
-static PetscErrorCode Use(HycoFOM f, PetscBool use)
+static PetscErrorCode FOMFrictionUse(HycoFOM f, PetscBool use)
 {
   HycoFriction r = f->friction;
   HycoPath p = f->path;
@@ -78,7 +78,7 @@ static PetscErrorCode Use(HycoFOM f, PetscBool use)
     r->other[j] = before;
     if (j < 2) PetscCall(CopyNormal(f, before, r->used, *at[j]));
   }
-  r->used = p->rubs = use;
+  r->used = p->has_friction = use;
   p->system = use ? r->system : f->system;
   p->solver = use ? r->solver : f->solver;
   p->B = use ? r->B : f->B;
@@ -122,7 +122,7 @@ PetscErrorCode HycoFrictionDestroy(HycoFOM f)
 
   PetscFunctionBegin;
   if (!r) PetscFunctionReturn(PETSC_SUCCESS);
-  if (r->B) PetscCall(Use(f, PETSC_FALSE)); /* the path frees its own vectors, f Lambda */
+  if (r->B) PetscCall(FOMFrictionUse(f, PETSC_FALSE)); /* the path frees its own vectors, f Lambda */
   f->pairs.shear = NULL;
   HycoDestroyAll(&r->solver, &r->system, &r->B, &r->Bt, &r->D, &r->L, &r->L_old, &r->L_before, &r->ahead, &r->work);
   for (PetscInt j = 0; j < N_PER_ROW; j++) PetscCall(VecDestroy(&r->other[j]));
@@ -139,7 +139,7 @@ PetscErrorCode HycoFrictionBegin(HycoFOM f)
 
   PetscFunctionBegin;
   /* The former path may have ended in a system with friction. */
-  if (r->B) PetscCall(Use(f, PETSC_FALSE));
+  if (r->B) PetscCall(FOMFrictionUse(f, PETSC_FALSE));
   PetscCall(VecSet(r->L, 0));
   PetscCall(VecSet(r->L_old, 0));
   PetscCall(VecSet(f->path->Lambda, 0));
@@ -189,10 +189,11 @@ static PetscErrorCode FillB(HycoFOM f, HycoFriction r, const HycoRows *rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The order matters: rows need the coefficients, Use() needs the matrices of the system to which it may change. */
-static PetscErrorCode Assemble(HycoFOM f, HycoFriction r, HycoRows *rows)
+/* The order matters: rows need the coefficients, FOMFrictionUse() needs the matrices of the system to which it may
+   change. */
+static PetscErrorCode FOMFrictionAssemble(HycoFOM f, HycoFriction r, HycoRows *rows)
 {
-  PetscBool rubs;
+  PetscBool has_friction;
 
   PetscFunctionBegin;
   HycoOnEach(HycoComm(f), ComputeRows(f, r, rows));
@@ -204,15 +205,15 @@ static PetscErrorCode Assemble(HycoFOM f, HycoFriction r, HycoRows *rows)
   HycoSystemSetSoft(r->system, &f->soft);
   PetscCall(HycoSystemSetBlocks(r->system, 2, r->slip.cone, f->pairs.n, r->slip.of, r->slip.data));
   /* Whether a coefficient is above 0 on some rank. */
-  rubs = HycoSlipRubs(&f->friction->slip);
-  HycoAllreduce(&rubs, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
-  PetscCall(Use(f, rubs));
+  has_friction = HycoSlipHasFriction(&f->friction->slip);
+  HycoAllreduce(&has_friction, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
+  PetscCall(FOMFrictionUse(f, has_friction));
   f->pairs.shear = &r->slip.shear;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The other start of the step to the time that is assembled. */
-static PetscErrorCode Extrapolate(HycoFOM f)
+static PetscErrorCode FOMFrictionExtrapolate(HycoFOM f)
 {
   HycoFriction r = f->friction;
   const PetscScalar *L, *before;
@@ -240,8 +241,8 @@ PetscErrorCode HycoFrictionAssemble(HycoFOM f)
 
   PetscFunctionBegin;
   PetscCheck(r->n_dof == f->fe_surface->n_dof, PETSC_COMM_SELF, PETSC_ERR_PLIB, "the surfaces changed along a path");
-  HycoFinally(Assemble(f, r, &rows), PetscCall(HycoRowsDestroy(&rows)));
-  PetscCall(Extrapolate(f));
+  HycoFinally(FOMFrictionAssemble(f, r, &rows), PetscCall(HycoRowsDestroy(&rows)));
+  PetscCall(FOMFrictionExtrapolate(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -261,7 +262,7 @@ static PetscErrorCode TakeForces(HycoFOM f)
 }
 
 /* Whether on some rank a contact with a force has no friction, or nothing rubs at all. */
-static PetscBool Smooth(HycoFOM f)
+static PetscBool FOMFrictionSmooth(HycoFOM f)
 {
   const HycoFriction r = f->friction;
   const PetscScalar *L;
@@ -283,14 +284,14 @@ PetscErrorCode HycoFrictionMoves(HycoFOM f, PetscBool *moves)
   *moves = PETSC_FALSE;
   PetscCall(HycoKernelVectors(f->K, &p, &v));
   if (!p) PetscFunctionReturn(PETSC_SUCCESS);
-  *moves = Smooth(f);
+  *moves = FOMFrictionSmooth(f);
   HycoAllreduce(moves, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Names the first motion that no contact force holds at the accepted time, and notes the time. Slips of later steps begin
-   from there. */
-static PetscErrorCode NameLoose(HycoFOM f)
+/* Names the first motion that no contact force holds at the accepted time, and notes the time. Slips of later steps
+   begin from there. */
+static PetscErrorCode NameFreeMotion(HycoFOM f)
 {
   HycoFriction r = f->friction;
   HycoPath path = f->path;
@@ -308,7 +309,7 @@ static PetscErrorCode NameLoose(HycoFOM f)
   PetscCall(PetscMalloc3(p * n, &A, n, &L, p, &first));
   PetscCall(HycoMotionRows(r->B, p, v, r->work, A));
   PetscCall(HycoVecGather(r->L, L));
-  PetscCall(HycoBlocksLoose(blocks, p, A, L, &loose, first));
+  PetscCall(HycoBlocksFreeMotions(blocks, p, A, L, &loose, first));
   if (loose && !path->loose[0]) {
     /* In the order of the null space, which is made from them. */
     PetscCall(HycoFEFreeMotions(HycoComm(f), f->fe, &motions));
@@ -323,7 +324,7 @@ static PetscErrorCode NameLoose(HycoFOM f)
 }
 
 /* Where a body may move freely because a coefficient is 0, it stays: with the least slip. */
-static PetscErrorCode Stay(HycoFOM f)
+static PetscErrorCode FOMFrictionLeastSlip(HycoFOM f)
 {
   HycoFriction r = f->friction;
   HycoBlocks *blocks;
@@ -347,7 +348,7 @@ static PetscErrorCode Stay(HycoFOM f)
   PetscCall(VecAYPX(r->work, -1, r->D));
   PetscCall(HycoVecGather(r->work, w));
   PetscCall(HycoVecGather(r->L, L));
-  PetscCall(HycoBlocksStay(blocks, p, A, w, L, move, x, &loose, first));
+  PetscCall(HycoBlocksLeastSlip(blocks, p, A, w, L, move, x, &loose, first));
   if (loose) PetscCall(VecMAXPY(f->U, p, x, (Vec *)v));
   PetscCall(PetscFree6(A, w, L, move, x, first));
   PetscCall(HycoBlocksDestroy(&blocks));
@@ -359,8 +360,8 @@ PetscErrorCode HycoFrictionTake(HycoFOM f)
 {
   PetscFunctionBegin;
   PetscCall(TakeForces(f));
-  PetscCall(Stay(f));
-  PetscCall(NameLoose(f));
+  PetscCall(FOMFrictionLeastSlip(f));
+  PetscCall(NameFreeMotion(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -484,7 +485,7 @@ PetscErrorCode HycoFrictionMeasure(HycoFOM f, HycoStep *s)
 
 /* The columns of a checkpoint: tangential force, slip, work and state of each contact. */
 #define N_STATE 8
-static PetscReal *Column(const HycoShear *s, PetscInt c, PetscInt *stride)
+static PetscReal *FOMFrictionColumn(const HycoShear *s, PetscInt c, PetscInt *stride)
 {
   *stride = c < 6 ? 3 : 1;
   return c < 3 ? s->force + c : c < 6 ? s->slip + (c - 3) : c < 7 ? s->work : s->state;
@@ -503,7 +504,7 @@ PetscErrorCode HycoFrictionSave(HycoFOM f, HycoH5 h)
     char name[32];
     PetscInt stride;
     /* Forces, slips, works and states of contacts in one list of columns. */
-    const PetscReal *from = Column(&f->friction->slip.shear, c, &stride);
+    const PetscReal *from = FOMFrictionColumn(&f->friction->slip.shear, c, &stride);
 
     for (PetscInt k = 0; k < f->pairs.n; k++) value[k] = from[k * stride];
     PetscCall(PetscSNPrintf(name, sizeof(name), "friction/%d", (int)c));
@@ -546,7 +547,7 @@ static PetscErrorCode TakeColumns(HycoFOM f, PetscReal *const value[N_STATE])
   PetscCall(VecCopy(f->Lambda, lambda));
   for (PetscInt c = 0; c < N_STATE; c++) {
     PetscInt stride;
-    PetscReal *to = Column(&f->friction->slip.shear, c, &stride);
+    PetscReal *to = FOMFrictionColumn(&f->friction->slip.shear, c, &stride);
 
     /* Its scatter from rank 0 is the only one in the order of the contacts, hence the detour. */
     PetscCall(HycoFOMSetLambda(f, value[c]));

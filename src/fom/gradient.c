@@ -6,9 +6,9 @@
 
   with the derivatives on the right at fixed U and L: differences of element sums and of rows of contacts. The factor
   is that of the solution. An output's derivative is its difference along U + h U', L + h L' on the mesh at mu + h.
-  A step of a path has the same equations, with the derivatives of the step before in its data (along.h).
+  A step of a path has the same equations, with the derivatives of the step before in its data (sensitivity_step.h).
 */
-#include "along.h"
+#include "sensitivity_step.h"
 
 #define CLOSED  1e-7 /* share of the largest gap below which one is closed */
 #define LAWS    2 /* quarters of the step with laws that flow, whose stresses at given strains are curved: eps^(1/3) */
@@ -16,7 +16,7 @@
 
 typedef struct {
   HycoFOM f;
-  HycoAlong along; /* NULL at a point */
+  HycoSensitivityStep along; /* NULL at a point */
   HycoGradientStore *store;
   PetscReal mu[HYCO_MAX_PARAMETERS];
   HycoSolverTangent tangent;
@@ -27,7 +27,7 @@ typedef struct {
   PetscReal size;         /* of gaps and displacements of the contacts */
   PetscReal *output;      /* 6 x n_outputs: at the three points, at closer ones */
   PetscBool stress;       /* the caller may hold the stresses */
-  PetscBool rubs;         /* L has the rows of tangents */
+  PetscBool has_friction; /* L has the rows of tangents */
   PetscBool regular;      /* the contacts determine the derivatives; */
   PetscBool remembers;    /* of a path: the next step depends on this one */
   PetscBool idle;         /* of a path: they do not, but nothing loads or moves the bodies */
@@ -45,8 +45,8 @@ static PetscErrorCode AddContacts(const Work *o, const PetscReal U[], const Pets
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  if (o->rubs)
-    ierr = HycoAlongRows(o->along, o->parameter, o->step, &rows);
+  if (o->has_friction)
+    ierr = HycoSensitivityRows(o->along, o->parameter, o->step, &rows);
   else
     ierr = HycoContactRows(f->fe_surface, &f->pairs, &rows);
   for (PetscInt k = 0; !ierr && k < rows.n; k++) {
@@ -70,7 +70,7 @@ static PetscErrorCode ContactData(Work *o, Vec R, Vec W)
   const PetscScalar *lambda;
   PetscScalar *w, *force;
   PetscReal *U;
-  /* Room of the surface's size: o->r is free until Differentiate() fills it. */
+  /* Room of the surface's size: o->r is free until GradientDifferentiate() fills it. */
   Vec at = f->to_surface ? f->U_surface : o->r;
 
   PetscFunctionBegin;
@@ -94,19 +94,19 @@ static PetscErrorCode ContactData(Work *o, Vec R, Vec W)
 }
 
 /* The coefficients of friction at the present parameters. Collective. */
-static PetscErrorCode Coefficients(Work *o, Vec C)
+static PetscErrorCode GradientCoefficients(Work *o, Vec C)
 {
   PetscScalar *mu;
 
   PetscFunctionBegin;
   PetscCall(VecGetArray(C, &mu));
-  HycoOnEach(HycoComm(o->f), HycoAlongCoefficients(o->along, mu));
+  HycoOnEach(HycoComm(o->f), HycoSensitivityCoefficients(o->along, mu));
   PetscCall(VecRestoreArray(C, &mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* R = K U - F, of what the parameter changes. Collective. */
-static PetscErrorCode Forces(Work *o, Vec R)
+static PetscErrorCode GradientForces(Work *o, Vec R)
 {
   HycoFOM f = o->f;
   const PetscInt dim = f->fe->dim;
@@ -120,7 +120,7 @@ static PetscErrorCode Forces(Work *o, Vec R)
   }
   PetscCall(PetscMalloc2(f->fe->n_dof, &u, f->fe->n_dof, &local));
   PetscCall(HycoFOMToLocal(f, o->U, u));
-  HycoOnEach(HycoComm(f), o->along && o->all ? HycoAlongImbalance(o->along, o->parameter, o->step, u, local)
+  HycoOnEach(HycoComm(f), o->along && o->all ? HycoSensitivityImbalance(o->along, o->parameter, o->step, u, local)
                                              : HycoFEImbalance(f->fe, u, (PetscBool)!o->all, local));
   PetscCall(VecGetArray(R, &r));
   for (PetscInt k = 0; k < f->fe->n_dof; k++) {
@@ -134,8 +134,9 @@ static PetscErrorCode Forces(Work *o, Vec R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* R[j] = K U - F + B^T L, w = D - B U, C[j], at the point j of d, with the free unknowns of the solution. Collective. */
-static PetscErrorCode Data(Work *o, const HycoDifference *d, PetscInt j, Vec w)
+/* R[j] = K U - F + B^T L, w = D - B U, C[j], at the point j of d, with the free unknowns of the solution.
+   Collective. */
+static PetscErrorCode GradientData(Work *o, const HycoDifference *d, PetscInt j, Vec w)
 {
   HycoFOM f = o->f;
   PetscReal at[HYCO_MAX_PARAMETERS];
@@ -146,9 +147,9 @@ static PetscErrorCode Data(Work *o, const HycoDifference *d, PetscInt j, Vec w)
   o->step = d->step[j];
   /* Moves the mesh and the supports to mu; o->U keeps the free unknowns of the solution. */
   PetscCall(HycoFOMSetParameters(f, at));
-  PetscCall(Forces(o, o->R[j]));
+  PetscCall(GradientForces(o, o->R[j]));
   if (f->n_contacts) PetscCall(ContactData(o, o->R[j], w));
-  if (o->dC) PetscCall(Coefficients(o, o->C[j]));
+  if (o->dC) PetscCall(GradientCoefficients(o, o->C[j]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -156,7 +157,7 @@ static PetscErrorCode Data(Work *o, const HycoDifference *d, PetscInt j, Vec w)
 static PetscErrorCode SetNormal(Work *o, PetscReal step)
 {
   HycoFOM f = o->f;
-  const HycoSlip *s = o->rubs ? HycoFrictionSlip(f->friction) : NULL;
+  const HycoSlip *s = o->has_friction ? HycoFrictionSlip(f->friction) : NULL;
   const PetscScalar *L, *dL;
   PetscScalar *normal;
 
@@ -176,7 +177,7 @@ static PetscErrorCode SetNormal(Work *o, PetscReal step)
 }
 
 /* The outputs at mu of the solution moved by step times its change. Collective. */
-static PetscErrorCode Measure(void *context, const PetscReal mu[], PetscReal step, PetscReal output[])
+static PetscErrorCode GradientMeasure(void *context, const PetscReal mu[], PetscReal step, PetscReal output[])
 {
   Work *o = (Work *)context;
   HycoFOM f = o->f;
@@ -198,14 +199,14 @@ static PetscErrorCode Measure(void *context, const PetscReal mu[], PetscReal ste
   /* Stresses are computed anew where an output needs them. */
   f->sigma_ready = PETSC_FALSE;
   PetscCall(HycoFOMGather(f));
-  if (o->along) PetscCall(HycoAlongShow(o->along, o->parameter, step, o->L, o->dL));
+  if (o->along) PetscCall(HycoSensitivityView(o->along, o->parameter, step, o->L, o->dL));
   PetscCall(HycoFOMMeasureQuantities(f, output));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Whether the gap of a closed contact has different slopes to the two sides: its master changes. closer: the gaps
    nearer to mu are known too; otherwise *turns may be curvature. Collective. */
-static PetscErrorCode Turns(Work *o, const HycoDifference *d, PetscBool closer, PetscBool *turns)
+static PetscErrorCode MasterChanges(Work *o, const HycoDifference *d, PetscBool closer, PetscBool *turns)
 {
   const PetscScalar *w[5], *L;
   PetscReal most, slope = 0;
@@ -236,20 +237,20 @@ static PetscErrorCode Turns(Work *o, const HycoDifference *d, PetscBool closer, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same, with the data nearer to mu only where they are needed: d becomes closer, so that its points are on this side of
-   a change of masters farther away. Collective. */
+/* The same, with the data nearer to mu only where they are needed: d becomes closer, so that its points are on this
+   side of a change of masters farther away. Collective. */
 static PetscErrorCode FindTurns(Work *o, HycoDifference *d, PetscBool *turns)
 {
   PetscFunctionBegin;
   for (PetscInt k = 0; k < HYCO_GRADIENT_CLOSER; k++) {
     HycoDifference near = *d;
 
-    PetscCall(Turns(o, d, PETSC_FALSE, turns));
+    PetscCall(MasterChanges(o, d, PETSC_FALSE, turns));
     if (!*turns) break;
     /* The size of a jump between slopes stays when the points come closer; that of curvature shrinks with them. */
     HycoDifferenceShrink(&near);
-    for (PetscInt j = 1; j < 3; j++) PetscCall(Data(o, &near, j, o->W[2 + j]));
-    PetscCall(Turns(o, d, PETSC_TRUE, turns));
+    for (PetscInt j = 1; j < 3; j++) PetscCall(GradientData(o, &near, j, o->W[2 + j]));
+    PetscCall(MasterChanges(o, d, PETSC_TRUE, turns));
     for (PetscInt j = 1; j < 3; j++) {
       Vec W = o->W[j];
 
@@ -262,18 +263,18 @@ static PetscErrorCode FindTurns(Work *o, HycoDifference *d, PetscBool *turns)
 }
 
 /* The change of the data: r of F - K U - B^T L, g of D - B U. Collective. */
-static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *turns)
+static PetscErrorCode GradientDifferentiate(Work *o, HycoDifference *d, PetscBool *turns)
 {
   HycoFOM f = o->f;
 
   PetscFunctionBegin;
   *turns = PETSC_FALSE;
-  for (PetscInt j = 1; j < 3; j++) PetscCall(Data(o, d, j, o->W[j]));
+  for (PetscInt j = 1; j < 3; j++) PetscCall(GradientData(o, d, j, o->W[j]));
   if (f->n_contacts) PetscCall(FindTurns(o, d, turns));
   /* A difference across a change of masters would mix two slopes. */
   if (*turns) HycoDifferenceTakeSide(d);
   if (d->weight[0] != 0)
-    PetscCall(Data(o, d, 0, o->W[0]));
+    PetscCall(GradientData(o, d, 0, o->W[0]));
   else
     PetscCall(VecSet(o->R[0], 0));
   PetscCall(VecSet(o->r, 0));
@@ -288,8 +289,9 @@ static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *turns
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bodies at rest that contact alone holds: a change of the loads, or of a gap that is closed, has no derivative. Collective. */
-static PetscErrorCode Rest(Work *o)
+/* Bodies at rest that contact alone holds: a change of the loads, or of a gap that is closed, has no derivative.
+   Collective. */
+static PetscErrorCode GradientAtRest(Work *o)
 {
   const PetscScalar *w, *g;
   PetscReal most, load;
@@ -314,18 +316,18 @@ static PetscErrorCode Rest(Work *o)
 
 /* The solution's change. *kink: an undecided contact takes another state towards the two sides. Where the step is
    remembered, such a step has no derivative. Collective. */
-static PetscErrorCode Solve(Work *o, const HycoDifference *d, PetscBool *kink)
+static PetscErrorCode GradientSolve(Work *o, const HycoDifference *d, PetscBool *kink)
 {
   PetscReal most = 0;
 
   PetscFunctionBegin;
   *kink = PETSC_FALSE;
-  if (o->rubs) {
+  if (o->has_friction) {
     PetscCall(HycoSolverTangentSolveCones(o->tangent, o->r, o->g, o->dC, d->step[1], o->dU, o->dL, o->dW, &o->regular));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (o->idle) {
-    PetscCall(Rest(o));
+    PetscCall(GradientAtRest(o));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(HycoSolverTangentSolve(o->tangent, o->r, o->g, d->sign, o->dU, o->dL, kink));
@@ -336,10 +338,10 @@ static PetscErrorCode Solve(Work *o, const HycoDifference *d, PetscBool *kink)
 }
 
 /* One column of the gradient. Collective. */
-static PetscErrorCode Column(Work *o, PetscInt p, HycoGradient *gradient)
+static PetscErrorCode GradientColumn(Work *o, PetscInt p, HycoGradient *gradient)
 {
   PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, turns, kink, smooth;
-  const PetscBool flows = (PetscBool)(o->along && HycoAlongFlows(o->along));
+  const PetscBool flows = (PetscBool)(o->along && HycoSensitivityFlows(o->along));
   HycoDifference d;
   HycoChanges c;
 
@@ -351,21 +353,21 @@ static PetscErrorCode Column(Work *o, PetscInt p, HycoGradient *gradient)
   HycoDifferenceSet(o->f->scene, o->mu, p, HYCO_GRADIENT_STEP, &d);
   for (PetscInt k = 0; flows && k < LAWS; k++) HycoDifferenceShrink(&d);
   for (PetscInt k = 0; o->regular; k++) {
-    PetscCall(Differentiate(o, &d, &turns));
+    PetscCall(GradientDifferentiate(o, &d, &turns));
     if (turns && o->remembers) o->regular = PETSC_FALSE;
-    if (o->regular) PetscCall(Solve(o, &d, &kink));
+    if (o->regular) PetscCall(GradientSolve(o, &d, &kink));
     if (!o->along || !o->regular) break;
-    PetscCall(HycoAlongTake(o->along, o->mu, &d, o->U, o->dU, &smooth));
+    PetscCall(HycoSensitivityAccept(o->along, o->mu, &d, o->U, o->dU, &smooth));
     if (smooth) break;
     /* A point that yields between mu and the points beside it; or at mu. */
     o->regular = (PetscBool)(k < HYCO_GRADIENT_CLOSER);
     HycoDifferenceShrink(&d);
   }
   if (!o->regular) PetscFunctionReturn(PETSC_SUCCESS);
-  if (o->rubs) PetscCall(HycoAlongSpend(o->along, p, o->L, o->W[0], o->dL, o->dW));
+  if (o->has_friction) PetscCall(HycoSensitivitySpend(o->along, p, o->L, o->W[0], o->dL, o->dW));
   if (o->store)
-    PetscCall(HycoGradientColumn(gradient, o->store, o->f->scene, o->mu, &d, (PetscBool)(turns || kink), Measure, o,
-                                 o->output));
+    PetscCall(HycoGradientColumn(gradient, o->store, o->f->scene, o->mu, &d, (PetscBool)(turns || kink),
+                                 GradientMeasure, o, o->output));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -385,15 +387,16 @@ static PetscErrorCode CreateContacts(Work *o)
   PetscCall(VecNorm(o->g, NORM_INFINITY, &bu));
   o->size = PetscMax(d, bu);
   if (!o->along || !f->friction) PetscFunctionReturn(PETSC_SUCCESS);
-  o->rubs = HycoAlongRubs(o->along);
+  o->has_friction = HycoSensitivityHasFriction(o->along);
   HycoVecDuplicate(L, &o->C[0], &o->C[1], &o->C[2], &o->dC, &o->dW);
   PetscCall(VecDuplicate(f->Lambda, &o->normal));
   PetscCall(VecCopy(f->Lambda, o->normal));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The system of the closed contacts. Where forces hold a body only by round-off the matrix may be regular. Collective. */
-static PetscErrorCode Determine(Work *o)
+/* The system of the closed contacts. Where forces hold a body only by round-off the matrix may be regular.
+   Collective. */
+static PetscErrorCode GradientDetermine(Work *o)
 {
   HycoFOM f = o->f;
   char name[HYCO_LINE] = "";
@@ -401,10 +404,11 @@ static PetscErrorCode Determine(Work *o)
 
   PetscFunctionBegin;
   PetscCall(HycoSolverTangentCreate(o->along ? f->path->solver : f->solver, o->U, o->L,
-                                    o->rubs ? HycoFrictionBefore(f->friction) : NULL, &o->tangent, &o->regular));
-  if (!f->n_contacts || o->rubs) PetscFunctionReturn(PETSC_SUCCESS);
+                                    o->has_friction ? HycoFrictionBefore(f->friction) : NULL, &o->tangent,
+                                    &o->regular));
+  if (!f->n_contacts || o->has_friction) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecNorm(o->L, NORM_INFINITY, &most));
-  if (most > 0) PetscCall(HycoFOMNameLoose(f, name));
+  if (most > 0) PetscCall(HycoFOMNameFreeMotion(f, name));
   o->regular = (PetscBool)(o->regular && !name[0]);
   if (o->along && !o->regular) {
     PetscCall(VecNorm(o->U, NORM_INFINITY, &moved));
@@ -422,7 +426,7 @@ static PetscErrorCode Determine(Work *o)
 
 /* Vectors, the data at the solution, and the system of its closed contacts. Collective. Copies of U and L: the model
    moves while differences are taken. */
-static PetscErrorCode Create(Work *o)
+static PetscErrorCode GradientCreate(Work *o)
 {
   HycoFOM f = o->f;
   HycoDifference d;
@@ -430,18 +434,18 @@ static PetscErrorCode Create(Work *o)
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(o->mu, f->fe->mu, f->scene->n_variables));
   o->stress = f->sigma_ready;
-  o->remembers = (PetscBool)(o->along && (f->friction || HycoAlongFlows(o->along)));
+  o->remembers = (PetscBool)(o->along && (f->friction || HycoSensitivityFlows(o->along)));
   PetscCall(PetscCalloc1(6 * f->scene->n_quantities + 1, &o->output));
   PetscCall(VecDuplicate(f->U, &o->U));
   PetscCall(VecCopy(f->U, o->U));
   HycoVecDuplicate(f->U, &o->r, &o->dU);
   for (PetscInt j = 0; j < 3; j++) PetscCall(VecDuplicate(f->U, &o->R[j]));
   if (f->n_contacts) PetscCall(CreateContacts(o));
-  /* Before Data() moves the mesh: the factor and B are those of the solution. */
-  PetscCall(Determine(o));
+  /* Before GradientData() moves the mesh: the factor and B are those of the solution. */
+  PetscCall(GradientDetermine(o));
   if (!o->regular) PetscFunctionReturn(PETSC_SUCCESS);
   HycoDifferenceSet(f->scene, o->mu, 0, HYCO_GRADIENT_STEP, &d);
-  PetscCall(Data(o, &d, 0, o->W[0]));
+  PetscCall(GradientData(o, &d, 0, o->W[0]));
   if (!o->store) PetscFunctionReturn(PETSC_SUCCESS);
   /* Of this path, and not of one with other round-off: all three points are. */
   if (o->along) f->sigma_ready = PETSC_FALSE;
@@ -451,7 +455,7 @@ static PetscErrorCode Create(Work *o)
 }
 
 /* The solution and the mesh are again what they were. Collective. */
-static PetscErrorCode Restore(Work *o)
+static PetscErrorCode GradientRestore(Work *o)
 {
   HycoFOM f = o->f;
   const HycoContactResult *results;
@@ -463,7 +467,7 @@ static PetscErrorCode Restore(Work *o)
   if (f->n_contacts) PetscCall(VecCopy(o->normal ? o->normal : o->L, f->Lambda));
   f->sigma_ready = PETSC_FALSE;
   if (o->along) {
-    PetscCall(HycoAlongEnd(o->along));
+    PetscCall(HycoSensitivityEnd(o->along));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(HycoFOMGather(f));
@@ -474,7 +478,7 @@ static PetscErrorCode Restore(Work *o)
 }
 
 /* Also after an error: all handles start as NULL. */
-static PetscErrorCode Destroy(Work *o)
+static PetscErrorCode GradientDestroy(Work *o)
 {
   PetscFunctionBegin;
   PetscCall(HycoSolverTangentDestroy(&o->tangent));
@@ -487,7 +491,7 @@ static PetscErrorCode Destroy(Work *o)
 }
 
 /* Refuses what has no gradient. Collective. */
-static PetscErrorCode Check(HycoFOM f)
+static PetscErrorCode GradientCheck(HycoFOM f)
 {
   HycoReason reason;
 
@@ -504,19 +508,19 @@ static PetscErrorCode Check(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFOMStateGradient(HycoFOM f, HycoAlong along, HycoGradientStore *store, HycoGradient *gradient,
-                                    PetscBool *regular)
+PetscErrorCode HycoFOMStateGradient(HycoFOM f, HycoSensitivityStep along, HycoGradientStore *store,
+                                    HycoGradient *gradient, PetscBool *regular)
 {
   Work o = {.f = f, .along = along, .store = store};
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  ierr = Create(&o);
+  ierr = GradientCreate(&o);
   if (!ierr && o.regular && !o.idle) gradient->n_undecided = HycoSolverTangentUndecided(o.tangent);
-  for (PetscInt p = 0; !ierr && o.regular && p < gradient->n_parameters; p++) ierr = Column(&o, p, gradient);
-  if (!ierr) ierr = Restore(&o);
+  for (PetscInt p = 0; !ierr && o.regular && p < gradient->n_parameters; p++) ierr = GradientColumn(&o, p, gradient);
+  if (!ierr) ierr = GradientRestore(&o);
   *regular = o.regular;
-  PetscCall(Destroy(&o));
+  PetscCall(GradientDestroy(&o));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -529,7 +533,7 @@ PetscErrorCode HycoFOMGetGradient(HycoFOM f, HycoGradient *gradient)
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   HycoCheckGiven(gradient);
-  PetscCall(Check(f));
+  PetscCall(GradientCheck(f));
   if (f->path) {
     PetscCall(HycoPathGradient(f, gradient));
     PetscFunctionReturn(PETSC_SUCCESS);

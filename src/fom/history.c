@@ -7,9 +7,9 @@
 #include <hycomaterialimpl.h>
 #include <stdlib.h>
 
-#define SLIDES 1e-6 /* of the whole time: the smallest step before a body slides away */
-#define GROWTH 1.5
-#define CREEPS 1e-12 /* a smaller inelastic strain of a whole path is round-off of elastic strains */
+#define SLIDING_STEP 1e-6 /* of the whole time: the smallest step before a body slides away */
+#define GROWTH       1.5
+#define CREEPS       1e-12 /* a smaller inelastic strain of a whole path is round-off of elastic strains */
 /* The share of the tolerance that a step may have whose own strain is small: a hundredth of the strain of the interval.
    Relaxation (n = 3 to 8, to a tenth of the stress) then takes 150 to 250 steps, and its strain is right to 0.4 %. */
 #define SHARE     0.01
@@ -134,7 +134,7 @@ PetscErrorCode HycoPathBegin(HycoPath p, const PetscReal mu[])
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(p->mu, mu, p->scene->n_parameters));
   p->t = p->scene->times[0];
-  p->slides[0] = p->loose[0] = '\0';
+  p->no_equilibrium[0] = p->loose[0] = '\0';
   p->step = p->n_steps = p->n_orders = p->n_taken = p->n_cuts = p->n_bound = 0;
   p->time_error = p->largest = p->ahead = p->rated_by = 0;
   p->rated = PETSC_FALSE;
@@ -169,7 +169,7 @@ static PetscErrorCode NoteOrder(HycoPath p, PetscReal order)
 
 /* Makes the attempt the state of the path at t1. States are exchanged, not copied: the former begin is the room of
    the next end. */
-static PetscErrorCode Accept(HycoPath p, PetscReal t1, const HycoStepAttempt *a)
+static PetscErrorCode HistoryAccept(HycoPath p, PetscReal t1, const HycoStepAttempt *a)
 {
   const PetscReal t0 = p->t;
   HycoFEState state = p->begin;
@@ -194,7 +194,7 @@ static PetscErrorCode Accept(HycoPath p, PetscReal t1, const HycoStepAttempt *a)
 }
 
 /* Work of rejected attempts counts too. */
-static void Count(HycoPath p, const HycoStepAttempt *a)
+static void HistoryCount(HycoPath p, const HycoStepAttempt *a)
 {
   p->now.iterations += a->iterations;
   p->now.factors += a->factors;
@@ -289,7 +289,7 @@ static PetscErrorCode TryStep(HycoPath p, PetscReal stop)
     if (LATE * e.allowed < h) HycoFormat(a.why, "the error in time of one step is %.1e", (double)e.error);
     PetscCall(HycoPathRestore(p));
   }
-  Count(p, &a);
+  HistoryCount(p, &a);
   if (!a.converged) {
     /* At least halved; a law may ask for less. */
     p->dt = h * PetscMin(0.5, a.law.dt_factor > 0 ? a.law.dt_factor : 0.5);
@@ -297,7 +297,7 @@ static PetscErrorCode TryStep(HycoPath p, PetscReal stop)
     PetscCall(PetscStrncpy(p->why, a.why, sizeof(p->why)));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(Accept(p, t1, &a));
+  PetscCall(HistoryAccept(p, t1, &a));
   TakeRates(p, h, &e);
   /* The next size: prescribed times are followed as given; a law's wish to shorten goes before growth. */
   if (p->given)
@@ -329,7 +329,7 @@ static PetscReal NextGiven(HycoPath p)
 
 /* From the previous listed time to the next; false: the step has become too small, or too many were halved. Stops
    are also the kinks of the scene's functions of time, so that no step jumps over one. */
-static PetscErrorCode Reach(HycoPath p, PetscReal end, PetscBool *reached)
+static PetscErrorCode HistoryReach(HycoPath p, PetscReal end, PetscBool *reached)
 {
   const HycoScene s = p->scene;
   PetscReal least = p->smallest * (s->times[s->n_times - 1] - s->times[0]);
@@ -343,34 +343,35 @@ static PetscErrorCode Reach(HycoPath p, PetscReal end, PetscBool *reached)
     if (p->substeps > 1 && !p->given) p->dt = PetscMin(p->dt, (end - s->times[p->step - 1]) / (PetscReal)p->substeps);
     PetscCall(HycoInterruptCheck());
     PetscCall(TryStep(p, stop));
-    /* Where a body slides away in a larger step, its time is known well enough: steps just before it are the dearest. */
-    if (p->slides[0]) least = PetscMax(least, SLIDES * (s->times[s->n_times - 1] - s->times[0]));
+    /* Where a body slides away in a larger step, its time is known well enough: steps just before it are the
+       dearest. */
+    if (p->no_equilibrium[0]) least = PetscMax(least, SLIDING_STEP * (s->times[s->n_times - 1] - s->times[0]));
     if (p->t == t && (p->dt < least || (p->most_cuts && p->n_cuts > p->most_cuts))) *reached = PETSC_FALSE;
-    /* At the listed time itself Advance() saves, after the time is recorded. */
+    /* At the listed time itself HistoryAdvance() saves, after the time is recorded. */
     if (p->t > t && p->t < end && p->ops->save) PetscCall((*p->ops->save)(p));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* At the first time the response is instantaneous: there is no step to halve. */
-static PetscErrorCode Start(HycoPath p, PetscBool *reached)
+static PetscErrorCode HistoryStart(HycoPath p, PetscBool *reached)
 {
   HycoStepAttempt a;
 
   PetscFunctionBegin;
   /* A step of no length: laws respond elastically, rates have no time. */
   PetscCall(HycoPathAttempt(p, p->t, p->t, &a));
-  Count(p, &a);
+  HistoryCount(p, &a);
   *reached = a.converged;
   if (a.converged)
-    PetscCall(Accept(p, p->t, &a));
+    PetscCall(HistoryAccept(p, p->t, &a));
   else
     HycoFormat(p->why, "at the first time, where all loads are applied at once: %s", a.why);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Records a listed time, or the time beyond which the path cannot continue. */
-static PetscErrorCode Record(HycoPath p)
+static PetscErrorCode HistoryRecord(HycoPath p)
 {
   PetscFunctionBegin;
   p->now.index = p->step;
@@ -381,20 +382,20 @@ static PetscErrorCode Record(HycoPath p)
 
 /* To the next listed time; false: it cannot be reached. The first listed time is an instantaneous response, later
    ones are integrated. */
-static PetscErrorCode Advance(HycoPath p, PetscBool *reached)
+static PetscErrorCode HistoryAdvance(HycoPath p, PetscBool *reached)
 {
   HycoScene s = p->scene;
   PetscReal begin = HycoNow();
 
   PetscFunctionBegin;
   if (p->step)
-    PetscCall(Reach(p, s->times[p->step], reached));
+    PetscCall(HistoryReach(p, s->times[p->step], reached));
   else
-    PetscCall(Start(p, reached));
+    PetscCall(HistoryStart(p, reached));
   /* Before the record is made, which stores it. */
   p->now.seconds += HycoNow() - begin;
   if (!*reached) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Record(p));
+  PetscCall(HistoryRecord(p));
   p->step++;
   p->ahead = p->largest;
   /* After each listed time at the latest; the full order also saves between. */
@@ -410,10 +411,10 @@ PetscErrorCode HycoPathRun(HycoPath p)
   PetscBool reached = PETSC_TRUE;
 
   PetscFunctionBegin;
-  while (p->step < p->scene->n_times && reached) PetscCall(Advance(p, &reached));
+  while (p->step < p->scene->n_times && reached) PetscCall(HistoryAdvance(p, &reached));
   p->ended = reached;
   if (!reached) PetscCall(HycoPathAssemble(p, p->t)); /* returns from the time that was not reached */
-  if (!reached && p->now.substeps) PetscCall(Record(p));
+  if (!reached && p->now.substeps) PetscCall(HistoryRecord(p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -446,7 +447,7 @@ void HycoPathExtremes(HycoScene scene, PetscInt n, const HycoStep step[], PetscR
 }
 
 /* Reals, for the median. */
-static int Ascending(const void *a, const void *b)
+static int HistoryAscending(const void *a, const void *b)
 {
   const PetscReal x = *(const PetscReal *)a, y = *(const PetscReal *)b;
 
@@ -470,6 +471,6 @@ void HycoPathGetHistory(HycoPath p, HycoHistory *h)
   h->taken = p->taken;
   if (p->n_steps) HycoPathExtremes(p->scene, p->n_steps, p->steps, h->path_quantity);
   /* In place: the order in time is not needed again. */
-  if (p->n_orders) qsort(p->orders, (size_t)p->n_orders, sizeof(*p->orders), Ascending);
+  if (p->n_orders) qsort(p->orders, (size_t)p->n_orders, sizeof(*p->orders), HistoryAscending);
   if (p->n_orders) h->order = p->orders[p->n_orders / 2];
 }

@@ -31,8 +31,8 @@ typedef struct {
 
 /* Evaluates the law at U: state `end`, f_int, r = F - f_int - B^T L, with `tangent` the consistent tangents; and the
    magnitudes of the terms of r. floor: 16 eps |diag(K) U|: below it the residual is round-off of U. */
-static PetscErrorCode Evaluate(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tangent, HycoStepAttempt *a,
-                               Progress *now)
+static PetscErrorCode NewtonEvaluate(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tangent, HycoStepAttempt *a,
+                                     Progress *now)
 {
   PetscReal begin = HycoNow(), size[3] = {0, 0, 0};
 
@@ -40,7 +40,7 @@ static PetscErrorCode Evaluate(HycoPath p, PetscReal t0, PetscReal t1, PetscBool
   PetscCall(PetscMemzero(&a->law, sizeof(a->law)));
   PetscCall((*p->ops->step)(p, t0, t1, tangent, &a->law));
   a->seconds_law += HycoNow() - begin;
-  now->residual[0] = now->residual[1]; /* also where a law fails: Shorten() takes one back for each evaluation */
+  now->residual[0] = now->residual[1]; /* also where a law fails: NewtonShorten() takes one back for each evaluation */
   now->residual[1] = now->residual[2];
   /* Stays where a law fails: such a step counts as diverged, not as stagnating. */
   now->residual[2] = PETSC_INFINITY;
@@ -93,7 +93,7 @@ PetscErrorCode HycoPathMoves(HycoPath p, const PetscScalar u[], Vec work, PetscB
 
 /* Whether K U + F - f_int may be round-off alone, which no contact forces of a floating body balance; *least: its size.
    With friction, or where contact alone holds a body. */
-static PetscErrorCode Rounding(HycoPath p, PetscReal *least)
+static PetscErrorCode NewtonRoundOff(HycoPath p, PetscReal *least)
 {
   MatNullSpace kernel = NULL;
   PetscReal size[2];
@@ -101,7 +101,7 @@ static PetscErrorCode Rounding(HycoPath p, PetscReal *least)
   PetscFunctionBegin;
   *least = -1;
   PetscCall(MatGetNullSpace(p->K, &kernel));
-  if (!p->rubs && !kernel) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!p->has_friction && !kernel) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecNorm(p->rhs, NORM_INFINITY, &size[0]));
   PetscCall(VecPointwiseMult(p->work, p->diagonal, p->U));
   PetscCall(VecNorm(p->work, NORM_INFINITY, &size[1]));
@@ -111,15 +111,15 @@ static PetscErrorCode Rounding(HycoPath p, PetscReal *least)
 
 /* rhs = K U + F - f_int: the right-hand side of the contact system. r is F - f_int - B^T L on entry, so that B^T L is
    added back. Where all loads vanish, their sum is round-off, and it is 0 then. The system's unknowns are U and L
-   themselves and not their changes, since contact conditions are on the whole of both. first: of a step, which moves the
-   supports; later iterates have their new values. *least: as of Rounding(). */
+   themselves and not their changes, since contact conditions are on the whole of both. first: of a step, which moves
+   the supports; later iterates have their new values. *least: as of NewtonRoundOff(). */
 static PetscErrorCode RightSide(HycoPath p, PetscBool first, PetscReal *least)
 {
   PetscReal size = 0;
 
   PetscFunctionBegin;
   PetscCall(MatMult(p->K, p->U, p->rhs));
-  PetscCall(Rounding(p, least));
+  PetscCall(NewtonRoundOff(p, least));
   PetscCall(VecAXPY(p->rhs, 1, p->r));
   if (p->n_contacts) PetscCall(MatMultAdd(p->Bt, p->Lambda, p->rhs, p->rhs));
   if (first) PetscCall((*p->ops->moves)(p, p->rhs));
@@ -141,7 +141,7 @@ static PetscErrorCode AssembleK(HycoPath p, PetscBool tangent)
 /* The residual to which a contact system is solved without a factor: a share of that of the iterate. With a tangent the
    share decreases with the residual, which preserves the order of convergence (S. Eisenstat, H. Walker, SIAM J. Sci.
    Comput. 17 (1996) 16-32). */
-static PetscReal Target(HycoPath p, const Progress *now)
+static PetscReal NewtonTolerance(HycoPath p, const Progress *now)
 {
   const PetscReal r = now->residual[2], least = PetscMax(0.1 * p->rtol * now->size, now->floor);
   const PetscReal share = p->tangent && r < FORCING * now->size ? r / now->size : FORCING;
@@ -166,7 +166,7 @@ static PetscErrorCode SolveSystem(HycoPath p, PetscBool first, const Progress *n
   if (p->n_contacts) PetscCall(VecCopy(p->Lambda, p->L_new));
   if (p->cold) PetscCall(HycoSolverSetWarmStart(p->solver, PETSC_FALSE));
   /* A solver with a factor ignores it. */
-  PetscCall(HycoSolverSetTarget(p->solver, Target(p, now)));
+  PetscCall(HycoSolverSetTarget(p->solver, NewtonTolerance(p, now)));
   HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(p->solver, p->G, p->L_new));
   if (p->cold) PetscCall(HycoSolverSetWarmStart(p->solver, PETSC_TRUE));
   p->cold = PETSC_FALSE;
@@ -201,9 +201,9 @@ PetscErrorCode HycoPathSolveAgain(HycoPath p, PetscBool *solved)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A step of Newton's method: to the system's solution; Evaluate() and Shorten() determine the step length. The slope
-   of the potential along the step is -(F - f_int) . dU. */
-static PetscErrorCode Advance(HycoPath p, PetscBool feasible, const HycoStepAttempt *a, Progress *now)
+/* A step of Newton's method: to the system's solution; NewtonEvaluate() and NewtonShorten() determine the step length.
+   The slope of the potential along the step is -(F - f_int) . dU. */
+static PetscErrorCode NewtonAdvance(HycoPath p, PetscBool feasible, const HycoStepAttempt *a, Progress *now)
 {
   PetscReal work;
 
@@ -212,7 +212,7 @@ static PetscErrorCode Advance(HycoPath p, PetscBool feasible, const HycoStepAtte
   if (p->n_contacts) PetscCall(VecCopy(p->Lambda, p->L_last));
   now->feasible = feasible;
   /* Friction has no potential: its forces depend on the normal ones. */
-  now->search = (PetscBool)(feasible && a->law.has_potential && !p->rubs);
+  now->search = (PetscBool)(feasible && a->law.has_potential && !p->has_friction);
   now->share = 1;
   if (now->search) { /* r + B^T L = F - f_int on the free unknowns; on the others U does not change */
     PetscCall(VecWAXPY(p->work, -1, p->U, p->G));
@@ -252,7 +252,7 @@ static PetscErrorCode IsLower(HycoPath p, const HycoStepAttempt *a, const Progre
 
 /* Halves the last step until the potential decreases, and evaluates there. The tangents of the last evaluation
    remain: those at the accepted point. */
-static PetscErrorCode Shorten(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAttempt *a, Progress *now)
+static PetscErrorCode NewtonShorten(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAttempt *a, Progress *now)
 {
   PetscBool lower;
 
@@ -262,10 +262,10 @@ static PetscErrorCode Shorten(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAt
     now->share /= 2;
     PetscCall(VecAXPBY(p->U, 0.5, 0.5, p->U_last));
     if (p->n_contacts) PetscCall(VecAXPBY(p->Lambda, 0.5, 0.5, p->L_last));
-    /* Evaluate() shifts the residuals: those of the refused point are taken out of the history. */
+    /* NewtonEvaluate() shifts the residuals: those of the refused point are taken out of the history. */
     now->residual[2] = now->residual[1]; /* the previous one */
     now->residual[1] = now->residual[0];
-    PetscCall(Evaluate(p, t0, t1, PETSC_TRUE, a, now));
+    PetscCall(NewtonEvaluate(p, t0, t1, PETSC_TRUE, a, now));
     PetscCall(IsLower(p, a, now, &lower));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -296,7 +296,7 @@ static PetscErrorCode SetChanged(HycoPath p, Vec a, Vec b, PetscBool *changed)
 
 /* Shifts the last differences by one place, and stores the newest, `vector` - `last`. Vectors are rotated, not
    copied. */
-static PetscErrorCode Push(PetscInt n, Vec store[], Vec vector, Vec last)
+static PetscErrorCode NewtonStore(PetscInt n, Vec store[], Vec vector, Vec last)
 {
   Vec oldest = store[0];
 
@@ -342,7 +342,7 @@ static PetscErrorCode LeastSquares(PetscInt n, Vec dG[], Vec g, PetscReal gamma[
 /* The next iterate with a K that is kept: the system's solution, mixed with previous ones on the same contacts. The
    first of a step, k = 0, does not satisfy the step's supports and is left out; the mixing begins with k = 1. With
    another contact set the former differences belong to another linear map. */
-static PetscErrorCode Mix(HycoPath p, PetscInt k)
+static PetscErrorCode NewtonExtrapolate(HycoPath p, PetscInt k)
 {
   PetscReal gamma[HYCO_ANDERSON];
   PetscBool changed = PETSC_FALSE;
@@ -355,9 +355,9 @@ static PetscErrorCode Mix(HycoPath p, PetscInt k)
     p->n_mixed = 0;
   else {
     /* The newest first; the oldest is overwritten. */
-    PetscCall(Push(p->n_mixed, p->dU, p->G, p->U_last));
-    PetscCall(Push(p->n_mixed, p->dG, p->work, p->G_last));
-    if (p->n_contacts) PetscCall(Push(p->n_mixed, p->dL, p->L_new, p->L_last));
+    PetscCall(NewtonStore(p->n_mixed, p->dU, p->G, p->U_last));
+    PetscCall(NewtonStore(p->n_mixed, p->dG, p->work, p->G_last));
+    if (p->n_contacts) PetscCall(NewtonStore(p->n_mixed, p->dL, p->L_new, p->L_last));
     p->n_mixed = PetscMin(p->n_mixed + 1, HYCO_ANDERSON);
   }
   PetscCall(VecCopy(p->G, p->U_last));
@@ -378,7 +378,7 @@ static PetscErrorCode Mix(HycoPath p, PetscInt k)
 
 /* The four residuals of the nonlinear problem: with the right-hand side K U + F - f_int, K cancels in the first.
    Feasibility and complementarity of the contacts at U, stationarity by the residual of the nonlinear forces. */
-static PetscErrorCode Judge(HycoPath p, const Progress *now, HycoStepAttempt *a, PetscReal *worst)
+static PetscErrorCode NewtonJudge(HycoPath p, const Progress *now, HycoStepAttempt *a, PetscReal *worst)
 {
   HycoKKT *kkt = &p->kkt;
   const PetscReal size = now->size > 0 ? now->size : 1;
@@ -398,7 +398,7 @@ static PetscErrorCode Judge(HycoPath p, const Progress *now, HycoStepAttempt *a,
 
 /* log(r2 / r1) / log(r1 / r0), unless one of the three is round-off. Three residuals in the asymptotic range are
    needed. */
-static void Observe(const Progress *now, PetscInt k, HycoStepAttempt *a)
+static void NewtonContractionOrder(const Progress *now, PetscInt k, HycoStepAttempt *a)
 {
   const PetscReal *r = now->residual, least = 1e-13 * now->size + now->floor;
 
@@ -408,7 +408,7 @@ static void Observe(const Progress *now, PetscInt k, HycoStepAttempt *a)
 
 /* Whether a new tangent is cheaper than the iterations that the present one would need. Expected iterations by the
    last contraction rate against WORTH, in logarithms. */
-static PetscBool Stalls(HycoPath p, const Progress *now)
+static PetscBool NewtonIsStalling(HycoPath p, const Progress *now)
 {
   const PetscReal *r = now->residual, target = PetscMax(p->rtol * now->size, now->floor), rate = r[2] / r[1];
 
@@ -417,12 +417,12 @@ static PetscBool Stalls(HycoPath p, const Progress *now)
 
 /* Updates K at U. The evaluation at U gave no tangents; residuals are kept, as U is the same. For the modified method:
    a new tangent where the kept one contracts too slowly. */
-static PetscErrorCode Renew(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAttempt *a, Progress *now)
+static PetscErrorCode NewtonRenew(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAttempt *a, Progress *now)
 {
   const Progress here = *now;
 
   PetscFunctionBegin;
-  PetscCall(Evaluate(p, t0, t1, PETSC_TRUE, a, now));
+  PetscCall(NewtonEvaluate(p, t0, t1, PETSC_TRUE, a, now));
   *now = here;
   PetscCall(AssembleK(p, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -433,10 +433,10 @@ static const PetscInt usual_its[] = {0, 15, 60, 30};
 
 /* One attempt: evaluate, test, assemble where needed, solve, advance. Ends with a->converged or a reason in a->why.
    least: the smallest residual so far, for the message; worst: of the contacts' conditions. */
-static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoNewton method, HycoStepAttempt *a)
+static PetscErrorCode NewtonIterate(HycoPath p, PetscReal t0, PetscReal t1, HycoNewton method, HycoStepAttempt *a)
 {
   const PetscBool tangent = (PetscBool)(method == HYCO_NEWTON_TANGENT);
-  const PetscBool one = (PetscBool)(p->rubs && !p->flows); /* one system is the solution */
+  const PetscBool one = (PetscBool)(p->has_friction && !p->flows); /* one system is the solution */
   const PetscInt most = p->max_its ? p->max_its : one ? FEW : usual_its[method];
   Progress now = {.residual = {0, 0, 0}};
   PetscReal least = PETSC_MAX_REAL, worst = 0;
@@ -445,15 +445,15 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoNewton
   for (PetscInt k = 0; !a->why[0]; k++) {
     PetscBool fresh = PETSC_FALSE;
 
-    PetscCall(Evaluate(p, t0, t1, tangent, a, &now));
-    if (tangent && k) PetscCall(Shorten(p, t0, t1, a, &now));
+    PetscCall(NewtonEvaluate(p, t0, t1, tangent, a, &now));
+    if (tangent && k) PetscCall(NewtonShorten(p, t0, t1, a, &now));
     if (a->law.failed) {
       HycoFormat(a->why, "%s", a->law.why);
       break;
     }
-    if (tangent && !a->linear_its) Observe(&now, k, a); /* else what the solves leave decides */
+    if (tangent && !a->linear_its) NewtonContractionOrder(&now, k, a); /* else what the solves leave decides */
     if (k && now.residual[2] <= PetscMax(p->rtol * now.size, now.floor)) {
-      PetscCall(Judge(p, &now, a, &worst));
+      PetscCall(NewtonJudge(p, &now, a, &worst));
       /* Of the contacts' residuals, which are relative. */
       a->converged = (PetscBool)(worst <= 1e-8);
       if (a->converged && p->ops->judge) PetscCall((*p->ops->judge)(p, HYCO_CONVERGED, a->why));
@@ -467,15 +467,15 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoNewton
                  HycoNewtons[method], one ? ", as at the largest load that friction balances" : "");
       break;
     }
-    if (method == HYCO_NEWTON_MODIFIED && k) fresh = Stalls(p, &now);
+    if (method == HYCO_NEWTON_MODIFIED && k) fresh = NewtonIsStalling(p, &now);
     if (tangent) PetscCall(AssembleK(p, PETSC_TRUE));
-    if (fresh) PetscCall(Renew(p, t0, t1, a, &now));
+    if (fresh) PetscCall(NewtonRenew(p, t0, t1, a, &now));
     PetscCall(SolveSystem(p, (PetscBool)(k == 0), &now, a));
     if (a->why[0]) break;
     if (tangent)
-      PetscCall(Advance(p, (PetscBool)(k > 0), a, &now));
+      PetscCall(NewtonAdvance(p, (PetscBool)(k > 0), a, &now));
     else
-      PetscCall(Mix(p, fresh ? 1 : k));
+      PetscCall(NewtonExtrapolate(p, fresh ? 1 : k));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -541,12 +541,12 @@ PetscErrorCode HycoPathAttempt(HycoPath p, PetscReal t0, PetscReal t1, HycoStepA
     PetscCall(AssembleK(p, PETSC_FALSE));
   }
   PetscCall(MatGetDiagonal(p->K, p->diagonal));
-  PetscCall(Iterate(p, t0, t1, method, a));
+  PetscCall(NewtonIterate(p, t0, t1, method, a));
   if (!a->converged && p->flows && method != HYCO_NEWTON_TANGENT && p->method != HYCO_NEWTON_ELASTIC) {
     /* The first failure is forgotten; the second one is the reason. */
     a->why[0] = '\0';
     PetscCall(HycoPathRestore(p));
-    PetscCall(Iterate(p, t0, t1, HYCO_NEWTON_TANGENT, a));
+    PetscCall(NewtonIterate(p, t0, t1, HYCO_NEWTON_TANGENT, a));
   }
   a->easy = (PetscBool)(a->iterations <= usual_its[method] / 2);
   if (!a->converged) PetscCall(HycoPathRestore(p));

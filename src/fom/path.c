@@ -84,7 +84,7 @@ static PetscErrorCode TakeForces(HycoFOM f)
 }
 /* Updates f->fe to mu, K, B, D; the loads without the effect of moved supports. The path adds the effect of moved
    supports itself, by increments: p->F is without lifting. */
-static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elastic)
+static PetscErrorCode FOMPathAssemble(HycoPath p, const PetscReal mu[], PetscBool elastic)
 {
   HycoFOM f = (HycoFOM)p->ctx;
   PetscBool lifted;
@@ -109,7 +109,7 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
 }
 
 /* Internal forces at U: scatter, complete eliminated unknowns, laws, reduction. Collective. */
-static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tangent, HycoFEStepReport *report)
+static PetscErrorCode FOMPathStep(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tangent, HycoFEStepReport *report)
 {
   HycoFOM f = (HycoFOM)p->ctx;
   PetscScalar *u;
@@ -129,8 +129,8 @@ static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tan
 }
 
 /* fe is at t, U that of the state. */
-static PetscErrorCode Rates(HycoPath p, PetscReal t, PetscReal dt, HycoFEState state, PetscReal rate[],
-                            PetscReal *largest)
+static PetscErrorCode FOMPathRates(HycoPath p, PetscReal t, PetscReal dt, HycoFEState state, PetscReal rate[],
+                                   PetscReal *largest)
 {
   HycoFOM f = (HycoFOM)p->ctx;
   PetscScalar *u;
@@ -146,7 +146,7 @@ static PetscErrorCode Rates(HycoPath p, PetscReal t, PetscReal dt, HycoFEState s
 }
 
 /* With the tangents that the last step() left in fe. */
-static PetscErrorCode Stiffness(HycoPath p)
+static PetscErrorCode FOMPathStiffness(HycoPath p)
 {
   PetscFunctionBegin;
   HycoOnEach(p->comm, HycoFEAssembleStiffness(p->fe, p->K));
@@ -154,7 +154,7 @@ static PetscErrorCode Stiffness(HycoPath p)
 }
 
 /* In the first iteration of a step the supports move to the new time's values. */
-static PetscErrorCode Moves(HycoPath p, Vec rhs)
+static PetscErrorCode FOMPathMoveSupports(HycoPath p, Vec rhs)
 {
   HycoFOM f = (HycoFOM)p->ctx;
   const PetscScalar *u;
@@ -286,15 +286,15 @@ static PetscErrorCode JudgeStep(HycoPath p, HycoReason reason, char why[HYCO_LIN
   PetscCall(VecGetArrayRead(f->U_local, &u));
   PetscCall(HycoFOMJudge(f, u, p->L_new, 0, &reason, &relative, why));
   PetscCall(VecRestoreArrayRead(f->U_local, &u));
-  if (f->friction && reason == HYCO_DIVERGED_FLOATING) HycoFormat(p->slides, "%s", why);
+  if (f->friction && reason == HYCO_DIVERGED_FLOATING) HycoFormat(p->no_equilibrium, "%s", why);
   /* Within round-off of the largest load that friction balances: what ends the path is what comes after it. */
-  if (reason == HYCO_DIVERGED_HELD && p->slides[0]) HycoFormat(why, "%s", p->slides);
+  if (reason == HYCO_DIVERGED_HELD && p->no_equilibrium[0]) HycoFormat(why, "%s", p->no_equilibrium);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Adds the step's energies, keeps F and f_int for the next one; between listed times the monitor gets the gathered
    solution. */
-static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
+static PetscErrorCode FOMPathAccept(HycoPath p, const HycoStepAttempt *a)
 {
   PetscReal defect = 0;
 
@@ -305,7 +305,7 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
   PetscCall(VecCopy(p->f_int, p->f_old));
   if (((HycoFOM)p->ctx)->friction) PetscCall(HycoFrictionAccept((HycoFOM)p->ctx));
   p->now.energy_defect = PetscMax(p->now.energy_defect, defect);
-  /* At the listed time Record() gathers, and calls the monitor. */
+  /* At the listed time FOMPathRecord() gathers, and calls the monitor. */
   if (p->between && p->t < p->scene->times[p->step]) {
     PetscCall(HycoFOMGather((HycoFOM)p->ctx));
     PetscCall((*p->between)((HycoFOM)p->ctx, p->monitor_ctx));
@@ -314,7 +314,7 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
 }
 
 /* The largest values over the cells of all ranks. Volume means by cell, at the state of the accepted time. */
-static PetscErrorCode Largest(HycoFOM f, HycoStep *s)
+static PetscErrorCode FOMPathLargest(HycoFOM f, HycoStep *s)
 {
   PetscReal *mises, *inelastic, most[2] = {0, 0};
 
@@ -374,14 +374,14 @@ static PetscErrorCode MeasureSliding(HycoFOM f, PetscReal *sliding)
 }
 
 /* Records a listed time. Energies are those since the start. */
-static PetscErrorCode Record(HycoPath p)
+static PetscErrorCode FOMPathRecord(HycoPath p)
 {
   HycoFOM f = (HycoFOM)p->ctx;
   HycoStep *s = &p->now;
 
   PetscFunctionBegin;
   PetscCall(MeasureContacts(f, s));
-  PetscCall(Largest(f, s));
+  PetscCall(FOMPathLargest(f, s));
   PetscCall(VecNorm(f->U, NORM_2, &s->u_norm2));
   s->work = p->work_done.loads + p->work_done.supports;
   s->contact_work = p->work_done.contact;
@@ -404,7 +404,7 @@ static PetscErrorCode Record(HycoPath p)
 }
 
 /* After each accepted step; does nothing without -hyco_checkpoint. */
-static PetscErrorCode Save(HycoPath p)
+static PetscErrorCode FOMPathSave(HycoPath p)
 {
   PetscFunctionBegin;
   PetscCall(HycoPathSave((HycoFOM)p->ctx));
@@ -415,15 +415,15 @@ static PetscErrorCode Save(HycoPath p)
    HycoPath, which reduced models share; this adds only what full order does differently. */
 PetscErrorCode HycoFOMPathCreate(HycoFOM f)
 {
-  static const HycoPathOps ops = {.assemble = Assemble,
-                                  .step = Step,
-                                  .stiffness = Stiffness,
-                                  .moves = Moves,
+  static const HycoPathOps ops = {.assemble = FOMPathAssemble,
+                                  .step = FOMPathStep,
+                                  .stiffness = FOMPathStiffness,
+                                  .moves = FOMPathMoveSupports,
                                   .judge = JudgeStep,
-                                  .rates = Rates,
-                                  .accept = Accept,
-                                  .record = Record,
-                                  .save = Save};
+                                  .rates = FOMPathRates,
+                                  .accept = FOMPathAccept,
+                                  .record = FOMPathRecord,
+                                  .save = FOMPathSave};
   HycoPath p = f->path;
 
   PetscFunctionBegin;

@@ -1,5 +1,5 @@
 /* The gradient of a path at full order: step by step, else by the paths beside it in its own steps. */
-#include "along.h"
+#include "sensitivity_step.h"
 
 typedef struct {
   HycoFOM f;
@@ -8,7 +8,7 @@ typedef struct {
 } Work;
 
 /* Solves at mu, without what shows a path to others. Collective. */
-static PetscErrorCode Solve(HycoFOM f, const PetscReal mu[])
+static PetscErrorCode PathGradientSolve(HycoFOM f, const PetscReal mu[])
 {
   HycoPath p = f->path;
   const HycoStepMonitor monitor = p->monitor;
@@ -42,7 +42,7 @@ static PetscErrorCode Solve(HycoFOM f, const PetscReal mu[])
 }
 
 /* A HycoGradientFollow. */
-static PetscErrorCode Follow(void *context, const PetscReal mu[], const HycoStep *step[])
+static PetscErrorCode PathGradientFollow(void *context, const PetscReal mu[], const HycoStep *step[])
 {
   const Work *o = (const Work *)context;
   HycoPath p = o->f->path;
@@ -53,12 +53,12 @@ static PetscErrorCode Follow(void *context, const PetscReal mu[], const HycoStep
   p->rtol = PetscMin(rtol, HYCO_GRADIENT_RTOL);
   p->n_given = o->n;
   p->given = o->taken;
-  ierr = Solve(o->f, mu);
+  ierr = PathGradientSolve(o->f, mu);
   p->rtol = rtol;
   p->n_given = 0;
   p->given = NULL;
   PetscCall(ierr);
-  PetscCall(HycoPathCheckBeside(p->ended, p->n_cuts, p->why));
+  PetscCall(HycoPathCheckPerturbed(p->ended, p->n_cuts, p->why));
   *step = p->steps;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -66,15 +66,15 @@ static PetscErrorCode Follow(void *context, const PetscReal mu[], const HycoStep
 /* The path that is solved again for its derivatives. */
 typedef struct {
   HycoFOM f;
-  HycoAlong along;
+  HycoSensitivityStep along;
   const HycoGradient *gradient;
   PetscReal most[HYCO_MAX_QUANTITIES]; /* the largest of each output on the path */
   PetscBool done;                      /* no step so far lacks them */
 } Again;
 
-/* After an accepted step. Those of elastic bodies without friction do not depend on each other, and are left out between
-   the listed times. */
-static PetscErrorCode Pass(HycoPath p, PetscReal t0, void *context)
+/* After an accepted step. Those of elastic bodies without friction do not depend on each other, and are left out
+   between the listed times. */
+static PetscErrorCode PathGradientPass(HycoPath p, PetscReal t0, void *context)
 {
   Again *o = (Again *)context;
   HycoFOM f = o->f;
@@ -85,13 +85,13 @@ static PetscErrorCode Pass(HycoPath p, PetscReal t0, void *context)
 
   PetscFunctionBegin;
   if (!o->done || (!lists && !f->friction && !p->flows)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoAlongStep(o->along, t0, &o->done));
+  PetscCall(HycoSensitivityAdvance(o->along, t0, &o->done));
   if (o->done) PetscCall(HycoFOMStateGradient(f, o->along, lists ? &there : NULL, &at, &o->done));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* All facets of masters that the points beside the path need: along the path the surfaces stay. Collective. */
-static PetscErrorCode Fetch(HycoFOM f, const PetscReal mu[])
+static PetscErrorCode PathGradientFetch(HycoFOM f, const PetscReal mu[])
 {
   PetscReal at[HYCO_MAX_PARAMETERS];
   HycoDifference d;
@@ -117,21 +117,21 @@ static PetscErrorCode BySteps(HycoFOM f, const PetscReal mu[], HycoGradient *gra
   PetscFunctionBegin;
   PetscCall(HycoGradientCreate(f->scene, &f->gradient, gradient));
   HycoPathLargest(f->scene, p->steps, o.most);
-  ierr = Fetch(f, mu);
-  if (!ierr) ierr = HycoAlongCreate(f, &o.along);
-  p->passes = Pass;
+  ierr = PathGradientFetch(f, mu);
+  if (!ierr) ierr = HycoSensitivityCreate(f, &o.along);
+  p->passes = PathGradientPass;
   p->passes_ctx = &o;
-  if (!ierr) ierr = Solve(f, mu);
+  if (!ierr) ierr = PathGradientSolve(f, mu);
   p->passes = NULL;
   *done = (PetscBool)(!ierr && o.done);
-  PetscCall(HycoAlongDestroy(&o.along));
+  PetscCall(HycoSensitivityDestroy(&o.along));
   PetscCall(ierr);
   if (*done) HycoGradientOfExtremes(f->scene, mu, p->steps, &f->gradient, gradient);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The same by the paths beside it. The path is solved again at the end: the caller may ask for any of its results. */
-static PetscErrorCode Beside(HycoFOM f, const PetscReal mu[], HycoGradient *gradient)
+static PetscErrorCode PathGradientPerturbedResidual(HycoFOM f, const PetscReal mu[], HycoGradient *gradient)
 {
   HycoPath p = f->path;
   Work o = {.f = f, .n = p->n_taken};
@@ -139,8 +139,8 @@ static PetscErrorCode Beside(HycoFOM f, const PetscReal mu[], HycoGradient *grad
 
   PetscFunctionBegin;
   HycoDuplicate(p->n_taken, p->taken, &o.taken);
-  ierr = HycoGradientOfPath(f->scene, mu, p->steps, &f->gradient, gradient, Follow, &o);
-  if (!ierr) ierr = Solve(f, mu);
+  ierr = HycoGradientOfPath(f->scene, mu, p->steps, &f->gradient, gradient, PathGradientFollow, &o);
+  if (!ierr) ierr = PathGradientSolve(f, mu);
   PetscCall(PetscFree(o.taken));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -156,6 +156,6 @@ PetscErrorCode HycoPathGradient(HycoFOM f, HycoGradient *gradient)
   HycoCheck(p->ended, "there is no gradient: the path ends at t = %g, before its last time", (double)p->t);
   PetscCall(PetscArraycpy(mu, f->fe->mu, f->scene->n_variables));
   if (!p->solver->iterative) HycoOnError(BySteps(f, mu, gradient, &done), f->solved = PETSC_FALSE);
-  if (!done) HycoOnError(Beside(f, mu, gradient), f->solved = PETSC_FALSE);
+  if (!done) HycoOnError(PathGradientPerturbedResidual(f, mu, gradient), f->solved = PETSC_FALSE);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

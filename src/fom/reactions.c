@@ -40,7 +40,7 @@ static PetscErrorCode ContactForces(HycoFOM f, PetscReal force[])
 }
 
 /* contact: room for n_dof reals. Collective. R = f_int - F - (-B^T L), at supported unknowns in generalised form. */
-static PetscErrorCode Reactions(HycoFOM f, PetscReal contact[], PetscReal r[])
+static PetscErrorCode ReactionsCompute(HycoFOM f, PetscReal contact[], PetscReal r[])
 {
   const PetscScalar *u;
   PetscReal *f_int = NULL, *along;
@@ -73,7 +73,7 @@ PetscErrorCode HycoFOMReactions(HycoFOM f, PetscReal r[])
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(f->fe->n_dof, &contact));
-  PetscCall(Reactions(f, contact, r));
+  PetscCall(ReactionsCompute(f, contact, r));
   PetscCall(PetscFree(contact));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -118,7 +118,8 @@ static PetscErrorCode FindSupports(HycoFOM f, PetscInt support[])
 
 #define SMALL 1e-6 /* share of all forces to which a body with smaller ones is compared */
 
-/* Everything on a body, or on bodies that share nodes or are tied: the magnitudes too, those of moments about the centre. */
+/* Everything on a body, or on bodies that share nodes or are tied: the magnitudes too, those of moments about the
+   centre. */
 typedef struct {
   HycoReaction all;
   PetscReal size, turns;
@@ -165,8 +166,8 @@ static PetscErrorCode AddSpring(HycoFE fe, PetscInt spring, PetscInt n, const Pe
 
 /* rho of min |force - sum of rho_k n_k| over the components that no plain support fixes, by Gaussian elimination: n
    vectors, n <= 3. */
-static void Resolve(PetscInt n, const HycoOblique *const o[], const PetscBool plain[3], const PetscReal force[3],
-                    PetscReal rho[3])
+static void ReactionsResolve(PetscInt n, const HycoOblique *const o[], const PetscBool plain[3],
+                             const PetscReal force[3], PetscReal rho[3])
 {
   PetscReal A[3][4];
 
@@ -208,7 +209,7 @@ static void AddSupports(Sums *s, HycoFE fe, PetscInt node, const PetscReal r[], 
     for (PetscInt d = 0; oblique && d < fe->dim; d++) force[d] -= oblique->a[d] * r[dof];
     if (oblique) o[n++] = oblique;
   }
-  if (n) Resolve(n, o, plain, force, rho);
+  if (n) ReactionsResolve(n, o, plain, force, rho);
   for (PetscInt k = 0; k < n; k++) {
     for (PetscInt d = 0; d < fe->dim; d++) {
       AddBoth(s, fe, node * fe->dim + d, rho[k] * o[k]->n[d], &s->result[o[k]->support]);
@@ -231,7 +232,7 @@ static PetscErrorCode AddUp(HycoFOM f, PetscReal *work, PetscInt support[], Sums
 
   PetscFunctionBegin;
   /* Nodal contact forces and what the supports must add for equilibrium. */
-  PetscCall(Reactions(f, contact, r));
+  PetscCall(ReactionsCompute(f, contact, r));
   HycoOnEach(HycoComm(f), HycoFELoads(f->fe, load));
   PetscCall(FindSupports(f, support));
   for (PetscInt i = 0; i < f->part->n_nodes; i++) {
@@ -246,9 +247,9 @@ static PetscErrorCode AddUp(HycoFOM f, PetscReal *work, PetscInt support[], Sums
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The largest component of what is left on a body of the forces, and of the moments about the centre, each over the sum of
-   its magnitudes. Moments of tied bodies depend on how their nodes are tied. */
-static PetscReal Left(const HycoFOM f, const Sums *s, PetscInt b, PetscReal force, PetscReal moment)
+/* The largest component of what is left on a body of the forces, and of the moments about the centre, each over the sum
+   of its magnitudes. Moments of tied bodies depend on how their nodes are tied. */
+static PetscReal ReactionsRemainingGap(const HycoFOM f, const Sums *s, PetscInt b, PetscReal force, PetscReal moment)
 {
   const OnBody *on = &s->body[b];
   const PetscReal size = PetscMax(on->size, SMALL * force), turns = PetscMax(on->turns, SMALL * moment);
@@ -268,7 +269,7 @@ static PetscReal Left(const HycoFOM f, const Sums *s, PetscInt b, PetscReal forc
 }
 
 /* Sums over the ranks, and the imbalance of the bodies. Collective. */
-static PetscErrorCode Balance(HycoFOM f, PetscInt n, Sums *s, PetscReal *balance)
+static PetscErrorCode ReactionsBalance(HycoFOM f, PetscInt n, Sums *s, PetscReal *balance)
 {
   const PetscInt n_bodies = f->scene->n_bodies;
   PetscReal force = 0, moment = 0, size;
@@ -314,7 +315,7 @@ static PetscErrorCode Balance(HycoFOM f, PetscInt n, Sums *s, PetscReal *balance
   *balance = 0;
   /* Without any force all of them are round-off of the displacements. */
   for (PetscInt b = 0; b < n_bodies && force > HYCO_NOTHING * size; b++)
-    *balance = PetscMax(*balance, Left(f, s, b, force, moment));
+    *balance = PetscMax(*balance, ReactionsRemainingGap(f, s, b, force, moment));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -364,7 +365,7 @@ PetscErrorCode HycoFOMGetReactions(HycoFOM f, PetscInt *n, const HycoReaction *r
   PetscCall(FindCentre(f, s.centre));
   PetscCall(AddUp(f, work, support, &s));
   PetscCall(PetscFree2(work, support));
-  PetscCall(Balance(f, all, &s, balance));
+  PetscCall(ReactionsBalance(f, all, &s, balance));
   HycoFreeAll(&s.part, &s.body);
   for (PetscInt k = 0; k < all; k++) {
     HycoReaction *r = &f->reaction[k];

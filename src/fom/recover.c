@@ -26,8 +26,8 @@ static PetscErrorCode SetUp(HycoFOM f)
   1e-12 /* of a Gram matrix relative to its largest value: less, and closed contacts do not determine a motion */
 #define REPEATS 2 /* the second removes the rounding of the first */
 
-/* Adds the rigid motions that contact alone prevents, which K leaves open: so that the contacts with a force close, in the
-   sense of least squares. */
+/* Adds the rigid motions that contact alone prevents, which K leaves open: so that the contacts with a force close, in
+   the sense of least squares. */
 static PetscErrorCode CloseContacts(HycoFOM f)
 {
   const Vec *z;

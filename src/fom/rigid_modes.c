@@ -45,8 +45,8 @@ static PetscErrorCode ToSurface(HycoFOM f, PetscInt n, const Vec v[], PetscReal 
 }
 
 /* "body upper from turning about (0, 0, 1) through (0, 10, 0); nor body ..." As many as there is room for. */
-static void Names(HycoFOM f, const HycoMotions *free, PetscInt n, const PetscReal unconstrained[], const char between[],
-                  size_t room, char list[])
+static void RigidModesNames(HycoFOM f, const HycoMotions *free, PetscInt n, const PetscReal unconstrained[],
+                            const char between[], size_t room, char list[])
 {
   list[0] = '\0';
   for (PetscInt k = 0; k < n; k++) {
@@ -103,8 +103,8 @@ static PetscErrorCode NameUnconstrained(HycoFOM f, const HycoMotions *free, cons
   char list[HYCO_LINE / 2];
 
   PetscFunctionBegin;
-  Names(f, free, z->n, z->all, "; nor ", sizeof(list), list);
-  Names(f, free, z->n, z->all, "; ", sizeof(f->summary.regularised), f->summary.regularised);
+  RigidModesNames(f, free, z->n, z->all, "; nor ", sizeof(list), list);
+  RigidModesNames(f, free, z->n, z->all, "; ", sizeof(f->summary.regularised), f->summary.regularised);
   HycoCheck(!z->n || f->regularise,
             "no support%s keeps %s; fix a component on one of its groups, or -hyco_regularise solves without %s",
             f->n_contacts ? " and no contact" : "", list, z->n > 1 ? "these motions" : "that motion");
@@ -315,7 +315,7 @@ PetscErrorCode HycoFOMRelease(HycoFOM f)
 }
 
 /* The work of forces on a motion, and the sum of its terms' magnitudes, which shows how much is not balanced. */
-static PetscErrorCode Work(Vec force, Vec motion, PetscReal *on, PetscReal *all)
+static PetscErrorCode RigidModesWork(Vec force, Vec motion, PetscReal *on, PetscReal *all)
 {
   Vec absolute;
 
@@ -350,7 +350,7 @@ PetscErrorCode HycoFOMBalance(HycoFOM f)
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < f->n_pins; k++) {
-    PetscCall(Work(f->F, f->released[k], &on, &all));
+    PetscCall(RigidModesWork(f->F, f->released[k], &on, &all));
     /* The motions are orthonormal, so that one pass suffices in any order. */
     PetscCall(VecAXPY(f->F, -on, f->released[k]));
     worst = PetscMax(worst, all > 0 ? PetscAbsReal(on) / all : 0);
@@ -427,7 +427,7 @@ static PetscErrorCode SetKernel(HycoFOM f)
 }
 
 /* Modified Gram-Schmidt, twice; dependent vectors are removed. Twice, against round-off of nearly dependent motions. */
-static PetscErrorCode Orthonormalize(PetscInt *n, Vec v[])
+static PetscErrorCode RigidModesOrthonormalize(PetscInt *n, Vec v[])
 {
   PetscInt kept = 0;
 
@@ -494,7 +494,7 @@ static PetscErrorCode SetNearKernel(HycoFOM f)
     }
     PetscCall(HycoVecAssemble(moves[k]));
   }
-  PetscCall(Orthonormalize(&n, moves));
+  PetscCall(RigidModesOrthonormalize(&n, moves));
   PetscCall(MatNullSpaceCreate(HycoComm(f), PETSC_FALSE, n, moves, &near));
   PetscCall(MatSetNearNullSpace(f->K, near));
   HycoDestroyAll(&near, &rigid);

@@ -77,7 +77,8 @@ static PetscErrorCode AddState(HycoSeries s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds contact force, pressure, gap and the contact by node; with friction the tangential traction, the slip and the state. */
+/* Adds contact force, pressure, gap and the contact by node; with friction the tangential traction, the slip and the
+   state. */
 static PetscErrorCode AddContacts(HycoSeries s)
 {
   const HycoSeriesSource *f = &s->from;
@@ -93,9 +94,9 @@ static PetscErrorCode AddContacts(HycoSeries s)
   if (!ierr) ierr = AddField(s, "contact_pressure", HYCO_ON_NODES, 1, c.pressure);
   if (!ierr) ierr = AddField(s, "gap", HYCO_ON_NODES, 1, c.gap_node);
   if (!ierr) ierr = AddField(s, "contact", HYCO_ON_NODES, 1, c.which);
-  if (!ierr && c.rubs) ierr = AddField(s, "contact_traction", HYCO_ON_NODES, 3, c.traction);
-  if (!ierr && c.rubs) ierr = AddField(s, "contact_slip", HYCO_ON_NODES, 3, c.slip);
-  if (!ierr && c.rubs) ierr = AddField(s, "contact_state", HYCO_ON_NODES, 1, c.state);
+  if (!ierr && c.has_friction) ierr = AddField(s, "contact_traction", HYCO_ON_NODES, 3, c.traction);
+  if (!ierr && c.has_friction) ierr = AddField(s, "contact_slip", HYCO_ON_NODES, 3, c.slip);
+  if (!ierr && c.has_friction) ierr = AddField(s, "contact_state", HYCO_ON_NODES, 1, c.state);
   PetscCall(HycoContactFieldsDestroy(&c));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -132,7 +133,7 @@ PetscErrorCode HycoFOMSetSeries(HycoFOM f, const char path[])
 
 /* The data of full order at its last time. Borrowed pointers, read again at each time, since the masters' search may
    replace the surfaces. */
-static PetscErrorCode Look(HycoFOM f, HycoSeriesSource *from)
+static PetscErrorCode SeriesFields(HycoFOM f, HycoSeriesSource *from)
 {
   HycoPath p = f->path;
 
@@ -172,7 +173,7 @@ PetscErrorCode HycoSeriesBegin(HycoFOM f)
 
   PetscFunctionBegin;
   if (!f->path->series) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Look(f, &from));
+  PetscCall(SeriesFields(f, &from));
   PetscCall(HycoSeriesOpen(f->path->series, &from));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -307,7 +308,7 @@ PetscErrorCode HycoSeriesAdd(HycoFOM f)
 
   PetscFunctionBegin;
   if (!s) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Look(f, &from));
+  PetscCall(SeriesFields(f, &from));
   if (f->path->checkpoint[0]) {
     /* By the number of times so far: a resumed run continues the numbers. */
     NamePart(f, s->file->n, path);

@@ -97,7 +97,7 @@ PetscErrorCode HycoSlipCoefficients(HycoSlip *s, HycoFE fe, const HycoPairs *pai
 }
 
 /* Local: the caller reduces over the ranks. */
-PetscBool HycoSlipRubs(const HycoSlip *s)
+PetscBool HycoSlipHasFriction(const HycoSlip *s)
 {
   for (PetscInt k = 0; k < s->n; k++) {
     if (s->mu[k] > 0) return PETSC_TRUE;
@@ -106,7 +106,7 @@ PetscBool HycoSlipRubs(const HycoSlip *s)
 }
 
 /* Of contact k, with the forces r and w of its rows. */
-static void Add(HycoSlip *h, PetscInt k, const PetscReal r[], const PetscReal w[], PetscReal most)
+static void SlipAdd(HycoSlip *h, PetscInt k, const PetscReal r[], const PetscReal w[], PetscReal most)
 {
   const HycoShear *s = &h->shear;
   const PetscReal *t = h->tangent + 6 * k;
@@ -127,7 +127,7 @@ static void Add(HycoSlip *h, PetscInt k, const PetscReal r[], const PetscReal w[
 void HycoSlipAdd(HycoSlip *s, const PetscReal L[], const PetscReal w[], PetscReal most)
 {
   HycoSlipVectors(s, L);
-  for (PetscInt k = 0; k < s->n; k++) Add(s, k, L + s->row[k], w + s->row[k], most);
+  for (PetscInt k = 0; k < s->n; k++) SlipAdd(s, k, L + s->row[k], w + s->row[k], most);
 }
 
 /* The times of the last two accepted steps, which HycoSlipExtrapolate() needs; n_taken: whether there are two. */
@@ -151,7 +151,7 @@ PetscBool HycoSlipExtrapolate(const HycoSlip *s, PetscReal t, PetscInt n, const 
   return PETSC_TRUE;
 }
 
-/* The force is the one on the slave, the opposite of the multiplier (Add()). */
+/* The force is the one on the slave, the opposite of the multiplier (SlipAdd()). */
 void HycoSlipForces(const HycoSlip *s, const PetscReal normal[], const PetscReal force[], PetscReal L[])
 {
   for (PetscInt k = 0; k < s->n; k++) {

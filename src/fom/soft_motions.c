@@ -1,7 +1,7 @@
 /*
-  Rigid motions that soft springs alone hold. K is regular, but its inverse consists of these motions: the flexibility of
-  the contacts would be lost in their round-off. A system with friction has them as unknowns of their own, like motions of
-  floating bodies, with the springs' stiffness in their block.
+  Rigid motions that soft springs alone hold. K is regular, but its inverse consists of these motions: the flexibility
+  of the contacts would be lost in their round-off. A system with friction has them as unknowns of their own, like
+  motions of floating bodies, with the springs' stiffness in their block.
 */
 #include <hycofomimpl.h>
 #include <petscblaslapack.h>
@@ -35,7 +35,8 @@ static PetscErrorCode SpringEnergy(HycoFOM f, const HycoMotions *motions, PetscI
 }
 
 /* Replaces the motions of a part by those of which the springs' energy is a sum of squares: their stiffnesses. */
-static PetscErrorCode Diagonalise(HycoFOM f, HycoMotions *motions, PetscInt first, PetscInt n, PetscReal stiffness[])
+static PetscErrorCode SoftMotionsDiagonalise(HycoFOM f, HycoMotions *motions, PetscInt first, PetscInt n,
+                                             PetscReal stiffness[])
 {
   const PetscInt rows = f->fe->n_dof;
   PetscReal E[36], work[64];
@@ -66,7 +67,7 @@ static PetscErrorCode Diagonalise(HycoFOM f, HycoMotions *motions, PetscInt firs
 }
 
 /* Keeps the soft ones, if springs hold some of them. */
-static PetscErrorCode Keep(HycoFOM f, HycoMotions *motions, PetscReal stiffness[])
+static PetscErrorCode SoftMotionsKeep(HycoFOM f, HycoMotions *motions, PetscReal stiffness[])
 {
   HycoSoft *s = &f->soft;
   PetscReal most = 0;
@@ -118,9 +119,9 @@ PetscErrorCode HycoFOMFindSoft(HycoFOM f)
   PetscCall(PetscCalloc1(motions.n + 1, &stiffness));
   for (PetscInt first = 0, n; first < motions.n; first += n) {
     for (n = 1; first + n < motions.n && motions.rigid[first + n].part == motions.rigid[first].part;) n++;
-    PetscCall(Diagonalise(f, &motions, first, n, stiffness + first));
+    PetscCall(SoftMotionsDiagonalise(f, &motions, first, n, stiffness + first));
   }
-  if (motions.n) PetscCall(Keep(f, &motions, stiffness));
+  if (motions.n) PetscCall(SoftMotionsKeep(f, &motions, stiffness));
   PetscCall(PetscFree(stiffness));
   PetscCall(HycoMotionsDestroy(&motions));
   PetscFunctionReturn(PETSC_SUCCESS);

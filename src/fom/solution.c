@@ -37,7 +37,7 @@ static PetscErrorCode MeasureContacts(HycoFOM f, HycoSummary *s)
 }
 
 /* Collective. */
-static PetscErrorCode NameBuried(HycoFOM f, HycoSummary *s)
+static PetscErrorCode NameInitialOverlap(HycoFOM f, HycoSummary *s)
 {
   PetscReal *normal, *gap, *share;
 
@@ -47,7 +47,7 @@ static PetscErrorCode NameBuried(HycoFOM f, HycoSummary *s)
   if (!(s->overlap > 0)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc3(3 * f->pairs.n, &normal, f->pairs.n, &gap, f->scene->n_contacts, &share));
   HycoOnEach(HycoComm(f), HycoContactGeometry(f->fe_surface, &f->pairs, normal, gap));
-  PetscCall(HycoContactBuried(HycoComm(f), f->fe, f->fe_surface, &f->pairs, gap, share));
+  PetscCall(HycoContactInitialOverlap(HycoComm(f), f->fe, f->fe_surface, &f->pairs, gap, share));
   for (PetscInt c = 0; c < f->scene->n_contacts; c++) {
     char one[HYCO_LINE];
 
@@ -208,9 +208,9 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   why[0] = '\0';
   if (f->path && f->path->loose[0]) HycoPathNameTimes(f->path->loose, f->path->loose_at, why);
   /* Of a path at its end, if nothing presses: friction may hold what normal forces do not. */
-  if (s->reason > 0 && !f->given && !why[0] && (!f->path || !s->n_active)) PetscCall(HycoFOMNameLoose(f, why));
+  if (s->reason > 0 && !f->given && !why[0] && (!f->path || !s->n_active)) PetscCall(HycoFOMNameFreeMotion(f, why));
   PetscCall(PetscStrncpy(s->loose, why, sizeof(s->loose)));
-  PetscCall(NameBuried(f, s));
+  PetscCall(NameInitialOverlap(f, s));
   for (PetscInt k = 0; f->path && k < f->path->n_steps; k++)
     s->sliding = PetscMax(s->sliding, f->path->steps[k].sliding); /* contacts may be open at the end */
   s->n_dependent = 0;
@@ -318,7 +318,7 @@ PetscErrorCode HycoFOMGetForces(HycoFOM f, PetscReal forces[])
 }
 
 /* The last solution in the form for output. Collective. */
-static PetscErrorCode Look(HycoFOM f, HycoSolution *solution)
+static PetscErrorCode SolutionFields(HycoFOM f, HycoSolution *solution)
 {
   PetscFunctionBegin;
   *solution = (HycoSolution){.fe = f->fe,
@@ -340,7 +340,7 @@ PetscErrorCode HycoFOMWrite(HycoFOM f, const char path[])
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   HycoCheckGiven(path);
   PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMWrite()");
-  PetscCall(Look(f, &solution));
+  PetscCall(SolutionFields(f, &solution));
   PetscCall(HycoSolutionWrite(path, &solution));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -367,7 +367,7 @@ PetscErrorCode HycoFOMWriteAdd(HycoFOM f)
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   PetscCheck(f->solved && f->set, PETSC_COMM_SELF, PETSC_ERR_ORDER,
              "call HycoFOMWriteBegin() and HycoFOMSolve() before HycoFOMWriteAdd()");
-  PetscCall(Look(f, &solution));
+  PetscCall(SolutionFields(f, &solution));
   PetscCall(HycoSolutionAdd(f->set, &solution));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

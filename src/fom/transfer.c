@@ -1,4 +1,5 @@
-/* Values of a solution between the distributed vectors, a rank's part, its contacts' surfaces, and the rows of files. */
+/* Values of a solution between the distributed vectors, a rank's part, its contacts' surfaces, and the rows of
+   files. */
 #include <hycofields.h>
 #include <hycofomimpl.h>
 

@@ -44,7 +44,7 @@ static void FromAxis(HycoCellType shape, const PetscInt node[], const PetscReal 
 
 /* Aspect ratio of a cell at a quadrature point, 1 if it is regular there: k + sqrt(k^2 - 1) with the condition
    number k = |J| |J^-1| / dim in the Frobenius norm of the map from the regular cell. Exact for rectangles. */
-static PetscReal Stretch(HycoCellType shape, const PetscInt node[], const PetscReal X[], PetscInt q)
+static PetscReal InspectBodiesStretch(HycoCellType shape, const PetscInt node[], const PetscReal X[], PetscInt q)
 {
   const HycoElement *el = HycoElementGet(shape);
   const PetscInt dim = HycoCellKinds[shape].dim;
@@ -87,7 +87,7 @@ void HycoInspectCells(HycoInspection *in, HycoFE fe)
     const PetscInt n = HycoMeshOwnNodes(m, e, node);
 
     for (PetscInt q = 0; q < (shape >= HYCO_N_MESH_TYPES || n == m->dim + 1 ? 1 : HycoElementGet(shape)->nq); q++) {
-      const PetscReal stretch = Stretch(shape, node, fe->X, q);
+      const PetscReal stretch = InspectBodiesStretch(shape, node, fe->X, q);
 
       if (stretch <= b->stretch * (1 + 1e-6)) continue; /* round-off, whose root remains for a square */
       b->stretch = stretch;
@@ -97,7 +97,7 @@ void HycoInspectCells(HycoInspection *in, HycoFE fe)
 }
 
 /* Halves the paths on the way: the trees stay flat. */
-static PetscInt Root(PetscInt part[], PetscInt i)
+static PetscInt InspectBodiesRoot(PetscInt part[], PetscInt i)
 {
   while (part[i] != i) i = part[i] = part[part[i]];
   return i;
@@ -118,10 +118,11 @@ static PetscErrorCode CountParts(HycoMesh m, PetscInt n_bodies, PetscInt n[])
     PetscCall(PetscArrayzero(seen, m->n_nodes));
     for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
       /* Joins each node of a cell with its first one. */
-      if (m->cell_body[k / m->nv] == b) part[Root(part, m->cells[k])] = Root(part, m->cells[k - k % m->nv]);
+      if (m->cell_body[k / m->nv] == b)
+        part[InspectBodiesRoot(part, m->cells[k])] = InspectBodiesRoot(part, m->cells[k - k % m->nv]);
     }
     for (PetscInt e = 0; e < m->n_cells; e++) {
-      const PetscInt root = Root(part, m->cells[e * m->nv]);
+      const PetscInt root = InspectBodiesRoot(part, m->cells[e * m->nv]);
 
       /* A part is counted by the first cell of its root, so that nodes without a cell of this body are none. */
       if (m->cell_body[e] != b || seen[root]) continue;

@@ -2,10 +2,10 @@
 #include "inspect.h"
 #include <hycobodiestraining.h>
 
-/* What a training finds itself, as assumed here, at least and at most: values of a parameter that changes a shape; samples
-   of displacements (as many rounds double them), and where a body turns. Of all values together; nodes of these at which
-   displacements are sampled; seconds of reading and recognition; modes of a body; closed contacts and entries of a row of
-   B; held-out solutions; unknowns inside. */
+/* What a training finds itself, as assumed here, at least and at most: values of a parameter that changes a shape;
+   samples of displacements (as many rounds double them), and where a body turns. Of all values together; nodes of these
+   at which displacements are sampled; seconds of reading and recognition; modes of a body; closed contacts and entries
+   of a row of B; held-out solutions; unknowns inside. */
 static const PetscReal VALUES[2] = {3, 5}, SAMPLES[2] = {93, 273}, OF_TURNS[2] = {93, 993};
 #define MOST_VALUES 60
 #define SPREAD      3
@@ -18,8 +18,8 @@ static const PetscReal VALUES[2] = {3, 5}, SAMPLES[2] = {93, 273}, OF_TURNS[2] =
 #define INNER_TABLE 6e6
 #define TURNS       3
 
-/* Solves with sparse factors, dense products on narrow matrices, and decompositions, relative to a product of large ones; a prediction, relative
-   to a product with a vector. */
+/* Solves with sparse factors, dense products on narrow matrices, and decompositions, relative to a product of large
+   ones; a prediction, relative to a product with a vector. */
 #define ONLINE_SHARE 0.65
 #define SOLVE_SHARE  0.12
 #define NARROW_SHARE 0.25
@@ -81,7 +81,8 @@ static void AddBody(const HycoInspection *in, PetscReal ns, PetscReal share, Pet
   *training += (values + 2 * axes) * ns * ns * ns / NARROW_SHARE;
   /* Displacements, and the rows of the model. */
   *training += (columns + (modes + inner) * values) * (4 * entries / SOLVE_SHARE + EACH * speed);
-  /* POD of the last samples, and before of half and a quarter of them; a turned body has several fields for each mode. */
+  /* POD of the last samples, and before of half and a quarter of them; a turned body has several fields for each
+     mode. */
   *training += 1.3 * (6 * rows * most * most + 20 * most * most * most) / POD_SHARE;
   if (turned) *training += (6 * rows + 20 * turns) * turns * turns / POD_SHARE;
   *prediction += ACTIVE * ns * ns * (values > 1 ? values : 1) + 2 * ACTIVE * ns * (modes + inner) * values;

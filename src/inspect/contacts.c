@@ -7,7 +7,7 @@
 
 /* Slave's facet size over the master's around contact k; 0: one of the groups is not a surface. size: room for 2
    reals a node. */
-static PetscReal Coarseness(const HycoPairs *p, PetscInt k, PetscInt n_nodes, const PetscReal size[])
+static PetscReal InspectContactsCoarseness(const HycoPairs *p, PetscInt k, PetscInt n_nodes, const PetscReal size[])
 {
   PetscReal master = 0;
 
@@ -44,7 +44,7 @@ static PetscErrorCode CompareFacets(HycoInspection *in, HycoFE fe, PetscInt cont
   PetscCall(FacetSizes(fe, "contact", c->slave, c->master, size));
   for (PetscInt k = 0; k < p->n; k++) {
     if (p->contact[k] != contact || p->master_start[k] == p->master_start[k + 1]) continue;
-    ratio[n++] = Coarseness(p, k, fe->mesh->n_nodes, size);
+    ratio[n++] = InspectContactsCoarseness(p, k, fe->mesh->n_nodes, size);
     /* Integrated contacts have several masters even where the meshes match. */
     in->contact[contact].between += !c->integrated && p->master_start[k + 1] > p->master_start[k] + 1;
   }
@@ -54,7 +54,8 @@ static PetscErrorCode CompareFacets(HycoInspection *in, HycoFE fe, PetscInt cont
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How hard the cell is pressed in, E / (1 - nu^2) of an isotropic law; of another one the mean stiffness along the axes. */
+/* How hard the cell is pressed in, E / (1 - nu^2) of an isotropic law; of another one the mean stiffness along the
+   axes. */
 static PetscReal PlaneModulus(HycoFE fe, PetscInt cell)
 {
   const PetscReal *c = fe->tangent + fe->tangent_start[cell];
@@ -101,7 +102,8 @@ static PetscErrorCode CompareStiffness(HycoInspection *in, HycoFE fe, PetscInt c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The facets of a tie's sides, over its nodes. By the largest of its masters, since mortar ties have many of small weight. */
+/* The facets of a tie's sides, over its nodes. By the largest of its masters, since mortar ties have many of small
+   weight. */
 static PetscErrorCode CompareTie(HycoFE fe, PetscInt tie, PetscReal *coarse)
 {
   HycoMesh m = fe->mesh;
@@ -182,7 +184,7 @@ PetscErrorCode HycoInspectGaps(HycoInspection *in, HycoFE fe, PetscBool first)
   PetscCall(PetscMalloc3(3 * p->n, &normal, p->n, &gap, s->n_contacts, &share));
   PetscCall(HycoContactGeometry(fe, p, normal, gap));
   PetscCall(HycoContactCheckNormals(PETSC_COMM_SELF, fe, p, normal));
-  PetscCall(HycoContactBuried(PETSC_COMM_SELF, fe, fe, p, gap, share));
+  PetscCall(HycoContactInitialOverlap(PETSC_COMM_SELF, fe, fe, p, gap, share));
   for (PetscInt c = 0; c < s->n_contacts; c++) {
     HycoContactInspection *r = &in->contact[c];
     PetscInt facing = 0, g = 0;

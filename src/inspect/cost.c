@@ -10,7 +10,7 @@
 #define SPARSE_SHARE 0.5
 
 /* Memory of the process now, summed over all ranks. ru_maxrss is in kilobytes on Linux, and is the largest so far. */
-static PetscErrorCode Resident(MPI_Comm comm, PetscReal *bytes)
+static PetscErrorCode CostResident(MPI_Comm comm, PetscReal *bytes)
 {
   struct rusage usage;
   PetscReal mine;
@@ -22,9 +22,10 @@ static PetscErrorCode Resident(MPI_Comm comm, PetscReal *bytes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Floating-point operations per second on this process. of[0]: a small matrix product; a peak of which a sparse factorisation
-   reaches the share SPARSE_SHARE. of[1]: a matrix times a vector, which memory bounds, and hardly the kernels of BLAS. */
-static PetscErrorCode Speed(PetscReal of[2])
+/* Floating-point operations per second on this process. of[0]: a small matrix product; a peak of which a sparse
+   factorisation reaches the share SPARSE_SHARE. of[1]: a matrix times a vector, which memory bounds, and hardly the
+   kernels of BLAS. */
+static PetscErrorCode CostSpeed(PetscReal of[2])
 {
   const PetscBLASInt n = 256, m = 700, step = 1;
   const PetscScalar one = 1, zero = 0;
@@ -57,13 +58,13 @@ PetscErrorCode HycoInspectCost(HycoFOM f, PetscReal assembly, HycoInspection *in
   PetscReal begin = HycoNow();
 
   PetscFunctionBegin;
-  PetscCall(Resident(HycoComm(f), &in->resident));
+  PetscCall(CostResident(HycoComm(f), &in->resident));
   PetscCall(HycoDirectCreate(HycoComm(f), &probe));
   PetscCall(HycoDirectPinKernel(probe, f->K));
   PetscCall(HycoDirectAnalyse(probe, f->K, f->n_contacts ? f->Bt : NULL, f->n_contacts ? f->B : NULL, PETSC_TRUE,
                               &in->bytes));
   begin = HycoNow() - begin;
-  PetscCall(Speed(speed));
+  PetscCall(CostSpeed(speed));
   in->first = assembly + begin + HycoDirectOperations(probe) / (SPARSE_SHARE * speed[0] * f->size);
   in->next = 20 * in->bytes / 8 / (SPARSE_SHARE * speed[0] * f->size); /* a few products with the factor */
   PetscCall(HycoDirectDestroy(&probe));

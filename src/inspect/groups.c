@@ -7,7 +7,7 @@
 #define ALIKE 0.95
 
 /* The number of common nodes of the groups g and h; both are ascending. One pass through both lists. */
-static PetscInt Common(HycoMesh m, PetscInt g, PetscInt h)
+static PetscInt GroupsCommon(HycoMesh m, PetscInt g, PetscInt h)
 {
   PetscInt n = 0, j = m->group_start[h];
 
@@ -32,7 +32,7 @@ static PetscErrorCode FindAlike(HycoInspection *in, HycoMesh m)
       a.n[1] = m->group_start[g + 1] - m->group_start[g];
       a.letters = (PetscBool)(strcasecmp(a.name[0], a.name[1]) == 0);
       if (m->group_dim[g] == m->group_dim[h] && a.n[1] && PetscMin(a.n[0], a.n[1]) >= ALIKE * PetscMax(a.n[0], a.n[1]))
-        a.common = Common(m, g, h);
+        a.common = GroupsCommon(m, g, h);
       a.nodes = (PetscBool)(a.common && a.common >= ALIKE * PetscMax(a.n[0], a.n[1]));
       if (!a.letters && !a.nodes) continue;
       PetscCall(PetscRealloc((size_t)(in->n_alike + 1) * sizeof(a), &in->alike));
@@ -43,7 +43,7 @@ static PetscErrorCode FindAlike(HycoInspection *in, HycoMesh m)
 }
 
 /* Sets used[] for the group `name`; fails if there is none. A HycoGroupVisitor. */
-static PetscErrorCode Use(const char key[], const char name[], void *context)
+static PetscErrorCode GroupUse(const char key[], const char name[], void *context)
 {
   HycoInspection *in = (HycoInspection *)context;
   PetscInt g = 0;
@@ -62,10 +62,10 @@ static PetscErrorCode MarkUsed(HycoInspection *in)
   PetscInt n = 64;
 
   PetscFunctionBegin;
-  PetscCall(HycoSceneVisitGroups(in->whole->scene, Use, in));
+  PetscCall(HycoSceneVisitGroups(in->whole->scene, GroupUse, in));
   PetscCall(PetscOptionsGetStringArray(in->whole->scene->options, NULL, "-hyco_rid_groups", region, &n, NULL));
   for (PetscInt k = 0; k < n && n < 64; k++) {
-    PetscCall(Use("hyco_rid_groups", region[k], in));
+    PetscCall(GroupUse("hyco_rid_groups", region[k], in));
     PetscCall(PetscFree(region[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

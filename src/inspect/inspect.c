@@ -31,7 +31,7 @@ static PetscErrorCode ListPoints(HycoScene s, PetscInt *n, PetscReal **mu)
 
 /* On rank 0, on the whole model, since shapes and gaps need whole surfaces. Where one rank runs, in->whole is the
    model just assembled. */
-static PetscErrorCode Measure(HycoFOM fom, HycoInspection *in, const PetscReal mu[], PetscBool first)
+static PetscErrorCode InspectMeasure(HycoFOM fom, HycoInspection *in, const PetscReal mu[], PetscBool first)
 {
   HycoFE fe = in->whole->fe;
 
@@ -61,8 +61,8 @@ static PetscErrorCode NamePoint(HycoScene s, const PetscReal v[], char place[HYC
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether forces or supports act at the assembled point; with a history also in between, if they change in time. Gaps are
-   on rank 0 alone, and are looked at there. Collective. */
+/* Whether forces or supports act at the assembled point; with a history also in between, if they change in time. Gaps
+   are on rank 0 alone, and are looked at there. Collective. */
 static PetscErrorCode FindLoads(HycoFOM f, HycoInspection *in, PetscBool first)
 {
   const HycoScene s = f->scene;
@@ -83,7 +83,7 @@ static PetscErrorCode FindLoads(HycoFOM f, HycoInspection *in, PetscBool first)
 
 /* Assembles K, F, B and D for the variables v as solve does; its errors are reported with the point. Collective. A
    failure must name the point: the user gave ranges, not values. */
-static PetscErrorCode Assemble(HycoFOM f, HycoInspection *in, const PetscReal v[], PetscBool first)
+static PetscErrorCode InspectAssemble(HycoFOM f, HycoInspection *in, const PetscReal v[], PetscBool first)
 {
   char message[HYCO_LINE], place[HYCO_LINE];
   PetscErrorCode ierr;
@@ -92,11 +92,11 @@ static PetscErrorCode Assemble(HycoFOM f, HycoInspection *in, const PetscReal v[
   HycoCatch(HycoFOMAssemble(f, v), ierr, message);
   PetscCall(NamePoint(f->scene, v, place));
   HycoCheck(!ierr, "%s%s", place, message);
-  PetscCall(HycoFOMLifts(f, message));
+  PetscCall(HycoFOMLiftOff(f, message));
   PetscCall(FindLoads(f, in, first));
   in->n_systems++;
   if (message[0] && !in->n_lifted++) PetscCall(PetscSNPrintf(in->lifted, sizeof(in->lifted), "%s%s", place, message));
-  HycoOnRoot(HycoComm(f), Measure(f, in, v, first));
+  HycoOnRoot(HycoComm(f), InspectMeasure(f, in, v, first));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -110,13 +110,13 @@ static PetscErrorCode InspectPoint(HycoFOM f, HycoInspection *in, const PetscRea
   PetscFunctionBegin;
   if (!s->n_times) {
     /* Without a history the parameters are all variables. */
-    PetscCall(Assemble(f, in, mu, first));
+    PetscCall(InspectAssemble(f, in, mu, first));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   HycoSceneSetTime(s, mu, s->times[s->n_times - 1], v);
-  PetscCall(Assemble(f, in, v, first));
+  PetscCall(InspectAssemble(f, in, v, first));
   HycoSceneSetTime(s, mu, s->times[0], v);
-  PetscCall(Assemble(f, in, v, PETSC_FALSE));
+  PetscCall(InspectAssemble(f, in, v, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -180,7 +180,7 @@ static PetscErrorCode FindMotions(HycoInspection *in)
 
 /* What needs no further assembly, on rank 0. After the centre was assembled, whose positions the lengths and
    motions refer to. */
-static PetscErrorCode Describe(HycoInspection *in)
+static PetscErrorCode InspectDescribe(HycoInspection *in)
 {
   HycoFOM f = in->whole;
   HycoScene s = f->scene;
@@ -200,8 +200,8 @@ static PetscErrorCode Describe(HycoInspection *in)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How the parameters enter the bodies, with changes from the point mu; of scenes with contact. With a history only what does
-   not depend on time. Collective. */
+/* How the parameters enter the bodies, with changes from the point mu; of scenes with contact. With a history only what
+   does not depend on time. Collective. */
 static PetscErrorCode DescribeBodies(HycoFOM f, const PetscReal mu[], const PetscReal speed[2], HycoInspection *in)
 {
   const HycoScene s = f->scene;
@@ -219,7 +219,7 @@ static PetscErrorCode DescribeBodies(HycoFOM f, const PetscReal mu[], const Pets
 }
 
 /* All points, the centre last, where the costs are measured. */
-static PetscErrorCode Visit(HycoFOM f, HycoInspection *in)
+static PetscErrorCode InspectVisit(HycoFOM f, HycoInspection *in)
 {
   const PetscInt p = f->scene->n_parameters;
   PetscReal *mu, begin, speed[2];
@@ -232,7 +232,7 @@ static PetscErrorCode Visit(HycoFOM f, HycoInspection *in)
   begin = HycoNow() - begin;
   /* The centre's assembly is timed, which is the last: the others have warmed up caches. */
   PetscCall(HycoInspectCost(f, begin, in, speed));
-  HycoOnRoot(HycoComm(f), Describe(in));
+  HycoOnRoot(HycoComm(f), InspectDescribe(in));
   PetscCall(DescribeBodies(f, mu, speed, in));
   PetscCall(PetscFree(mu));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -240,7 +240,7 @@ static PetscErrorCode Visit(HycoFOM f, HycoInspection *in)
 
 /* Room for what is found; names are those of the scene. The other ranks have no in->whole; what they allocate here
    stays empty. */
-static PetscErrorCode Begin(HycoFOM f, HycoInspection *in)
+static PetscErrorCode InspectBegin(HycoFOM f, HycoInspection *in)
 {
   HycoScene s = f->scene;
 
@@ -271,8 +271,8 @@ PetscErrorCode HycoInspect(HycoFOM f, HycoInspection *in)
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   HycoCheckGiven(in);
   PetscCall(PetscMemzero(in, sizeof(*in)));
-  HycoOnEach(HycoComm(f), Begin(f, in));
-  ierr = Visit(f, in);
+  HycoOnEach(HycoComm(f), InspectBegin(f, in));
+  ierr = InspectVisit(f, in);
   /* HycoInspectionDestroy() releases in->whole in either case. */
   if (in->whole == f) PetscCall(PetscObjectReference((PetscObject)f));
   if (ierr) (void)!HycoInspectionDestroy(in);

@@ -9,7 +9,7 @@
 
 /* Entries between the first nonzero of each row and its diagonal, in the order of `order`. The envelope bounds the
    fill of a factor in this order. */
-static PetscErrorCode Envelope(Mat K, IS order, PetscReal *sum)
+static PetscErrorCode BandedEnvelope(Mat K, IS order, PetscReal *sum)
 {
   PetscInt n;
   const PetscInt *ia, *ja, *old, *new_of;
@@ -93,7 +93,7 @@ PetscErrorCode HycoBanded(Mat K, PetscBool *thin)
   /* Long rows: no order makes the envelope small. */
   if (info.nz_used > HYCO_THIN_ROW * (PetscReal)n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatGetOrdering(K, MATORDERINGRCM, &row, &col));
-  PetscCall(Envelope(K, row, &sum));
+  PetscCall(BandedEnvelope(K, row, &sum));
   HycoDestroyAll(&row, &col);
   *thin = (PetscBool)(sum <= HYCO_THIN_ENVELOPE * (PetscReal)n);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -126,7 +126,7 @@ static PetscErrorCode ProjectForce(const HycoLevel *v, Vec r)
 
 /* Chebyshev steps on K z = r from the current z; r becomes the residual (without `residual`, that before the last
    step). Each step is projected, so that z satisfies the constraints throughout. */
-static PetscErrorCode Smooth(HycoLevel *v, PetscBool residual, Vec r, Vec z)
+static PetscErrorCode ConstrainedSmooth(HycoLevel *v, PetscBool residual, Vec r, Vec z)
 {
   const PetscReal hi = HYCO_EIGEN_SAFETY * v->largest, lo = HYCO_EIGEN_LEAST * v->largest;
   const PetscReal theta = (hi + lo) / 2, delta = (hi - lo) / 2;
@@ -176,7 +176,7 @@ static PetscErrorCode SolveCoarsest(HycoConstrained c, HycoLevel *v, Vec r, Vec 
 
 /* z = M r, M symmetric, B z = 0; r is overwritten. Symmetric, as conjugate gradients need: the same smoother before
    and after, restriction transpose to interpolation. */
-static PetscErrorCode Cycle(HycoConstrained c, PetscInt l, Vec r, Vec z)
+static PetscErrorCode ConstrainedCycle(HycoConstrained c, PetscInt l, Vec r, Vec z)
 {
   HycoLevel *v = &c->level[l];
 
@@ -188,21 +188,21 @@ static PetscErrorCode Cycle(HycoConstrained c, PetscInt l, Vec r, Vec z)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(VecSet(z, 0));
-  PetscCall(Smooth(v, PETSC_TRUE, r, z));
+  PetscCall(ConstrainedSmooth(v, PETSC_TRUE, r, z));
   PetscCall(ProjectForce(v, r));
   PetscCall(MatMultTranspose(v->P, r, v[1].r));
-  PetscCall(Cycle(c, l + 1, v[1].r, v[1].z));
+  PetscCall(ConstrainedCycle(c, l + 1, v[1].r, v[1].z));
   PetscCall(MatMult(v->P, v[1].z, v->d));
   PetscCall(HycoLevelProject(v, v->d));
   PetscCall(VecAXPY(z, 1, v->d));
   PetscCall(MatMult(v->product, v->d, v->w));
   PetscCall(VecAXPY(r, -1, v->w));
-  PetscCall(Smooth(v, PETSC_FALSE, r, z));
+  PetscCall(ConstrainedSmooth(v, PETSC_FALSE, r, z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Of another preconditioner than multigrid only the projected application. */
-static PetscErrorCode Apply(PC shell, Vec r, Vec z)
+static PetscErrorCode ConstrainedApply(PC shell, Vec r, Vec z)
 {
   HycoConstrained c;
   HycoLevel *v;
@@ -213,7 +213,7 @@ static PetscErrorCode Apply(PC shell, Vec r, Vec z)
   PetscCall(VecCopy(r, v->r));
   /* The multigrid cycle projects at each smoother. */
   if (c->coarse)
-    PetscCall(Cycle(c, 0, v->r, z));
+    PetscCall(ConstrainedCycle(c, 0, v->r, z));
   else {
     PetscCall(ProjectForce(v, v->r));
     PetscCall(PCApply(c->pc, v->r, z));
@@ -223,7 +223,7 @@ static PetscErrorCode Apply(PC shell, Vec r, Vec z)
 }
 
 /* Of the multigrid inside: the shell has nothing to show. */
-static PetscErrorCode View(PC shell, PetscViewer viewer)
+static PetscErrorCode ConstrainedView(PC shell, PetscViewer viewer)
 {
   HycoConstrained c;
 
@@ -260,8 +260,8 @@ PetscErrorCode HycoConstrainedCreate(MPI_Comm comm, const char prefix[], Mat K, 
   PetscCall(PCSetOperators(shell, c->level->product, K));
   PetscCall(PCShellSetName(shell, type));
   PetscCall(PCShellSetContext(shell, c));
-  PetscCall(PCShellSetApply(shell, Apply));
-  PetscCall(PCShellSetView(shell, View));
+  PetscCall(PCShellSetApply(shell, ConstrainedApply));
+  PetscCall(PCShellSetView(shell, ConstrainedView));
   PetscCall(KSPSetPC(c->ksp, shell));
   c->shell = shell;
   PetscCall(PCDestroy(&shell)); /* the solver has a reference */

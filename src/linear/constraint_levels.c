@@ -161,7 +161,8 @@ static PetscErrorCode AggregatesAt(const HycoLevel *fine, const Known *known, Pe
 /* An orthonormal basis of the columns of the normals' rows i[0..n), largest first: column j of q (leading dimension
    3 in `weight`) at each of them; the new constraints' normals. Returns their number. Gram-Schmidt with pivoting on
    three columns. */
-static PetscInt Basis(PetscInt n, const PetscInt i[], const PetscReal normal[], PetscReal weight[], PetscReal coarse[])
+static PetscInt ConstraintLevelsBasis(PetscInt n, const PetscInt i[], const PetscReal normal[], PetscReal weight[],
+                                      PetscReal coarse[])
 {
   PetscReal largest = 0;
   PetscInt made = 0;
@@ -209,8 +210,8 @@ static PetscInt Basis(PetscInt n, const PetscInt i[], const PetscReal normal[], 
 
 /* Coarse constraints and A: column first[i] + j has the entry weight[3 i + j] in row i, j < count[i]. By sorted
    aggregates, on every rank alike. */
-static PetscErrorCode Coarsen(const HycoLevel *fine, PetscInt coarse_size, const Known *known, Known *coarse,
-                              PetscInt first[], PetscInt count[], PetscReal weight[])
+static PetscErrorCode ConstraintLevelsCoarsen(const HycoLevel *fine, PetscInt coarse_size, const Known *known,
+                                              Known *coarse, PetscInt first[], PetscInt count[], PetscReal weight[])
 {
   PetscInt *aggregate, *order;
 
@@ -228,7 +229,7 @@ static PetscErrorCode Coarsen(const HycoLevel *fine, PetscInt coarse_size, const
     for (end = begin + 1; end < known->m && aggregate[order[end]] == aggregate[order[begin]];) end++;
     /* Constraints on decoupled rows have no coarse displacement, and end here. */
     if (aggregate[order[begin]] >= 0)
-      made = Basis(end - begin, order + begin, known->normal, weight, coarse->normal + 3 * coarse->m);
+      made = ConstraintLevelsBasis(end - begin, order + begin, known->normal, weight, coarse->normal + 3 * coarse->m);
     for (PetscInt k = begin; k < end; k++) {
       first[order[k]] = coarse->m;
       count[order[k]] = made;
@@ -249,7 +250,7 @@ static PetscErrorCode CoarseB(HycoLevel *fine, const Known *known, Mat coarse_K,
   PetscFunctionBegin;
   PetscCall(MatGetBlockSize(coarse_K, &bs));
   PetscCall(PetscMalloc3(known->m, &first, known->m, &count, 3 * known->m, &weight));
-  PetscCall(Coarsen(fine, bs, known, coarse, first, count, weight));
+  PetscCall(ConstraintLevelsCoarsen(fine, bs, known, coarse, first, count, weight));
   PetscCall(MatGetOwnershipRange(fine->B, &lo, &hi));
   PetscCall(MatCreateAIJ(PetscObjectComm((PetscObject)fine->B), hi - lo, PETSC_DECIDE, known->m, coarse->m, 3, NULL, 3,
                          NULL, &A));
@@ -268,7 +269,7 @@ static PetscErrorCode CoarseB(HycoLevel *fine, const Known *known, Mat coarse_K,
 
 /* A solver for G, whose diagonal entries are about 1; each rank has the factor. PCREDUNDANT: each rank factors the
    gathered matrix. */
-static PetscErrorCode Redundant(Mat G, KSP *ksp)
+static PetscErrorCode ConstraintLevelsRedundant(Mat G, KSP *ksp)
 {
   KSP inner;
   PC pc;
@@ -298,7 +299,7 @@ static PetscErrorCode SolverForG(Mat G, KSP *ksp)
   PetscFunctionBegin;
   PetscCall(MatGetSize(G, &m, NULL));
   if (HycoSize(comm) > 1 && m <= HYCO_ALIKE)
-    PetscCall(Redundant(G, ksp));
+    PetscCall(ConstraintLevelsRedundant(G, ksp));
   else
     PetscCall(HycoDirectSolver(comm, "hyco_primal_constraints_", G, PETSC_TRUE, ksp));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -35,17 +35,17 @@ enum { BEGIN = -1, END = -2, ANALYSE = 1, FACTOR = 2, SOLVE = 3 };
 #define INFOG(d, k) ((d)->id.infog[(k)-1])
 
 /* MUMPS's single entry point: the job decides. */
-static void Call(HycoDirect d, int job)
+static void MumpsCall(HycoDirect d, int job)
 {
   d->id.job = job;
   dmumps_c(&d->id);
 }
 
 /* Ends the MUMPS instance: pattern, analysis and factor. */
-static PetscErrorCode Release(HycoDirect d)
+static PetscErrorCode MumpsRelease(HycoDirect d)
 {
   PetscFunctionBegin;
-  if (d->begun) Call(d, END);
+  if (d->begun) MumpsCall(d, END);
   d->begun = PETSC_FALSE;
   d->K_id = d->B_id = 0;
   HycoFreeAll(&d->id.irn_loc, &d->id.jcn_loc, &d->id.a_loc, &d->id.perm_in, &d->id.listvar_schur, &d->rhs, &d->reduced);
@@ -69,7 +69,7 @@ PetscErrorCode HycoDirectDestroy(HycoDirect *d)
 {
   PetscFunctionBegin;
   if (!*d) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Release(*d));
+  PetscCall(MumpsRelease(*d));
   HycoFreeAll(&(*d)->pinned, d);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -83,7 +83,7 @@ PetscErrorCode HycoDirectPin(HycoDirect d, PetscInt n, const PetscInt pinned[])
   /* Both lists are ascending. */
   for (PetscInt k = 0; same && k < n; k++) same = (PetscBool)(pinned[k] == d->pinned[k]);
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Release(d));
+  PetscCall(MumpsRelease(d));
   PetscCall(PetscFree(d->pinned));
   HycoDuplicate(n + 1, pinned, &d->pinned);
   d->n_pinned = n;
@@ -111,7 +111,7 @@ PetscErrorCode HycoDirectPinKernel(HycoDirect d, Mat K)
 
 /* Collects the entries of the saddle point in this rank's rows of K, B (and Bt): the lower triangle when symmetric.
    pattern: also their places; values if a_loc exists. */
-static PetscErrorCode Entries(HycoDirect d, Mat A, PetscInt row0, PetscInt col0, PetscBool pattern, MUMPS_INT8 *at)
+static PetscErrorCode MumpsEntries(HycoDirect d, Mat A, PetscInt row0, PetscInt col0, PetscBool pattern, MUMPS_INT8 *at)
 {
   PetscInt lo, hi;
 
@@ -144,10 +144,10 @@ static PetscErrorCode AllEntries(HycoDirect d, Mat K, Mat Bt, Mat B, PetscBool p
   MUMPS_INT8 at = 0;
 
   PetscFunctionBegin;
-  PetscCall(Entries(d, K, 0, 0, pattern, &at));
-  if (B) PetscCall(Entries(d, B, d->n, 0, pattern, &at));
+  PetscCall(MumpsEntries(d, K, 0, 0, pattern, &at));
+  if (B) PetscCall(MumpsEntries(d, B, d->n, 0, pattern, &at));
   /* Symmetric: the lower triangle suffices. */
-  if (B && !d->symmetric) PetscCall(Entries(d, Bt, 0, d->n, pattern, &at));
+  if (B && !d->symmetric) PetscCall(MumpsEntries(d, Bt, 0, d->n, pattern, &at));
   d->id.nnz_loc = at;
   if (d->alone) { /* centralised entries: no communication */
     d->id.nnz = at;
@@ -198,7 +198,7 @@ static PetscErrorCode PlaceLast(HycoDirect d, const PetscInt place[])
 }
 
 /* Debian's MUMPS has no METIS; its own orders give several times the fill for 3D meshes. */
-static PetscErrorCode Order(HycoDirect d, Mat K)
+static PetscErrorCode MumpsOrder(HycoDirect d, Mat K)
 {
   PetscInt *place = NULL;
 
@@ -236,14 +236,14 @@ static PetscErrorCode ReadControls(HycoDirect d)
 }
 
 /* sym 1: positive definite, which needs no pivoting; Schur variables are not factored. */
-static PetscErrorCode Begin(HycoDirect d)
+static PetscErrorCode MumpsBegin(HycoDirect d)
 {
   PetscFunctionBegin;
   PetscCall(PetscMemzero(&d->id, sizeof(d->id)));
   d->id.comm_fortran = (MUMPS_INT)MPI_Comm_c2f(d->comm);
   d->id.par = 1;
   d->id.sym = d->symmetric ? 1 : 0;
-  Call(d, BEGIN);
+  MumpsCall(d, BEGIN);
   PetscCheck(INFOG(d, 1) >= 0, d->comm, PETSC_ERR_LIB, "MUMPS could not start (INFOG(1) = %d)", (int)INFOG(d, 1));
   d->begun = PETSC_TRUE;
   ICNTL(d, 1) = ICNTL(d, 2) = ICNTL(d, 3) = -1; /* no output */
@@ -284,22 +284,22 @@ static PetscErrorCode NotePattern(HycoDirect d, Mat K, Mat B)
 }
 
 /* Analysis of the pattern, with the room for right-hand sides on rank 0. */
-static PetscErrorCode Analyse(HycoDirect d, Mat K, Mat Bt, Mat B)
+static PetscErrorCode MumpsAnalyse(HycoDirect d, Mat K, Mat Bt, Mat B)
 {
   size_t room;
   Vec x;
 
   PetscFunctionBegin;
-  PetscCall(Begin(d));
+  PetscCall(MumpsBegin(d));
   PetscCall(CountEntries(K, d->symmetric ? NULL : Bt, B, &room));
   PetscCall(PetscMalloc1(room, &d->id.irn_loc));
   PetscCall(PetscMalloc1(room, &d->id.jcn_loc));
   PetscCall(AllEntries(d, K, Bt, B, PETSC_TRUE));
   d->id.n = (MUMPS_INT)(d->n + d->m);
   PetscCall(DeclareSchur(d));
-  PetscCall(Order(d, K));
+  PetscCall(MumpsOrder(d, K));
   PetscCall(ReadControls(d));
-  Call(d, ANALYSE);
+  MumpsCall(d, ANALYSE);
   PetscCheck(INFOG(d, 1) >= 0, d->comm, PETSC_ERR_LIB,
              "MUMPS could not analyse K (INFOG(1) = %d, INFOG(2) = %d); use -hyco_linear iterative, or other "
              "-hyco_mumps_icntl_...",
@@ -333,7 +333,7 @@ static PetscErrorCode SamePattern(HycoDirect d, Mat K, Mat B, PetscBool *same)
   *same = (PetscBool)(d->begun && d->K_id == K_id && d->B_id == B_id && d->K_pattern == K_pattern &&
                       d->B_pattern == B_pattern);
   /* Values may differ: the analysis depends on the pattern. */
-  if (!*same) PetscCall(Release(d));
+  if (!*same) PetscCall(MumpsRelease(d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -344,7 +344,7 @@ PetscErrorCode HycoDirectAnalyse(HycoDirect d, Mat K, Mat Bt, Mat B, PetscBool s
   PetscBool same = PETSC_FALSE;
 
   PetscFunctionBegin;
-  if (symmetric != d->symmetric) PetscCall(Release(d));
+  if (symmetric != d->symmetric) PetscCall(MumpsRelease(d));
   PetscCall(SamePattern(d, K, B, &same));
   if (!same) {
     PetscCall(MatGetSize(K, &d->n, NULL));
@@ -352,7 +352,7 @@ PetscErrorCode HycoDirectAnalyse(HycoDirect d, Mat K, Mat Bt, Mat B, PetscBool s
     if (B) PetscCall(MatGetSize(B, &d->m, NULL));
     d->symmetric = symmetric;
     d->n_schur = d->n_pinned + d->m;
-    PetscCall(Analyse(d, K, Bt, B));
+    PetscCall(MumpsAnalyse(d, K, Bt, B));
   }
   /* INFOG(17): megabytes over all ranks. */
   *bytes = 1e6 * (PetscReal)INFOG(d, 17) + 8. * (PetscReal)d->n_schur * (PetscReal)d->n_schur;
@@ -399,7 +399,7 @@ PetscErrorCode HycoDirectFactor(HycoDirect d, Mat K, Mat Bt, Mat B, PetscReal M[
   d->id.schur_lld = (MUMPS_INT)d->n_schur;
   /* Each round has four times the extra workspace. */
   for (;;) {
-    Call(d, FACTOR);
+    MumpsCall(d, FACTOR);
     /* -8, -9 and similar codes: the workspace was underestimated */
     if ((INFOG(d, 1) != -8 && INFOG(d, 1) != -9 && INFOG(d, 1) != -17 && INFOG(d, 1) != -20) || ICNTL(d, 14) > 3000)
       break;
@@ -421,7 +421,7 @@ PetscErrorCode HycoDirectFactor(HycoDirect d, Mat K, Mat Bt, Mat B, PetscReal M[
 
 /* Copies a distributed vector of n unknowns to rank 0's right-hand side, or back. MUMPS has centralised right-hand
    sides. */
-static PetscErrorCode Fetch(HycoDirect d, Vec v)
+static PetscErrorCode MumpsFetch(HycoDirect d, Vec v)
 {
   PetscFunctionBegin;
   PetscCall(HycoScatter(d->to_root, v, d->root));
@@ -437,7 +437,7 @@ static PetscErrorCode Fetch(HycoDirect d, Vec v)
 }
 
 /* MUMPS returns the solution on rank 0, from which the ranks get their rows. */
-static PetscErrorCode Deliver(HycoDirect d, Vec v)
+static PetscErrorCode MumpsDeliver(HycoDirect d, Vec v)
 {
   PetscFunctionBegin;
   if (d->rank == 0) {
@@ -450,12 +450,12 @@ static PetscErrorCode Deliver(HycoDirect d, Vec v)
 
 /* part: 0 without Schur variables, 1 reduction to them, 2 expansion from them (ICNTL(26)). If there are none, the
    expansion alone solves. */
-static PetscErrorCode Run(HycoDirect d, int part)
+static PetscErrorCode MumpsRun(HycoDirect d, int part)
 {
   PetscFunctionBegin;
   if (part == 1 && !d->n_schur) PetscFunctionReturn(PETSC_SUCCESS);
   ICNTL(d, 26) = d->n_schur ? part : 0;
-  Call(d, SOLVE);
+  MumpsCall(d, SOLVE);
   PetscCheck(INFOG(d, 1) >= 0, d->comm, PETSC_ERR_LIB, "MUMPS could not solve (INFOG(1) = %d, INFOG(2) = %d)",
              (int)INFOG(d, 1), (int)INFOG(d, 2));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -466,9 +466,9 @@ PetscErrorCode HycoDirectReduce(HycoDirect d, const Vec v[], const PetscReal sti
                                 const PetscReal D[], PetscReal q[])
 {
   PetscFunctionBegin;
-  PetscCall(Fetch(d, F));
+  PetscCall(MumpsFetch(d, F));
   if (d->rank == 0) PetscCall(PetscArraycpy(d->rhs + d->n, D, d->m));
-  PetscCall(Run(d, 1));
+  PetscCall(MumpsRun(d, 1));
   for (PetscInt k = 0; k < d->n_schur && d->rank == 0; k++) q[k] = k < d->n_pinned ? -d->reduced[k] : d->reduced[k];
   HycoBcast(q, d->n_schur, MPIU_REAL, d->comm);
   if (v) PetscCall(HycoMotionClean(d->n_pinned, v, stiffness, d->pinned, F, least, q));
@@ -481,8 +481,8 @@ PetscErrorCode HycoDirectExpand(HycoDirect d, const PetscReal z[], Vec x)
 {
   PetscFunctionBegin;
   if (d->rank == 0) PetscCall(PetscArraycpy(d->reduced, z, d->n_schur));
-  PetscCall(Run(d, 2));
-  PetscCall(Deliver(d, x));
+  PetscCall(MumpsRun(d, 2));
+  PetscCall(MumpsDeliver(d, x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -496,14 +496,14 @@ static PetscErrorCode CondenseMany(HycoDirect d, PetscInt k, const Vec F[], Pets
   if (d->rank == 0) PetscCall(PetscCalloc1(rows * (size_t)k + 1, all));
   if (d->rank == 0) PetscCall(PetscCalloc1((size_t)d->n_schur * (size_t)k + 1, reduced));
   for (PetscInt j = 0; j < k; j++) {
-    PetscCall(Fetch(d, F[j]));
+    PetscCall(MumpsFetch(d, F[j]));
     if (d->rank == 0) PetscCall(PetscArraycpy(*all + rows * (size_t)j, d->rhs, d->n));
   }
-  /* Not d->rhs, whose room is for one; the next Fetch() sets it back. */
+  /* Not d->rhs, whose room is for one; the next MumpsFetch() sets it back. */
   d->id.rhs = *all;
   d->id.redrhs = *reduced;
   d->id.nrhs = (MUMPS_INT)k;
-  PetscCall(Run(d, 1));
+  PetscCall(MumpsRun(d, 1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -534,10 +534,10 @@ PetscErrorCode HycoDirectExpandMany(HycoDirect d, PetscInt k, const Vec F[], con
   PetscCall(CondenseMany(d, k, F, &all, &reduced));
   if (d->rank == 0) PetscCall(PetscArraycpy(reduced, z, (size_t)d->n_schur * (size_t)k));
   /* Phase 2: the expansion from the Schur unknowns. */
-  PetscCall(Run(d, 2));
+  PetscCall(MumpsRun(d, 2));
   for (PetscInt j = 0; j < k; j++) {
     if (d->rank == 0) PetscCall(PetscArraycpy(d->rhs, all + rows * (size_t)j, d->n));
-    PetscCall(Deliver(d, x[j]));
+    PetscCall(MumpsDeliver(d, x[j]));
   }
   HycoFreeAll(&all, &reduced);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -547,11 +547,11 @@ PetscErrorCode HycoDirectExpandMany(HycoDirect d, PetscInt k, const Vec F[], con
 PetscErrorCode HycoDirectSolve(HycoDirect d, Vec r, Vec x)
 {
   PetscFunctionBegin;
-  PetscCall(Fetch(d, r));
+  PetscCall(MumpsFetch(d, r));
   if (d->rank == 0) PetscCall(PetscArrayzero(d->rhs + d->n, d->m));
-  PetscCall(Run(d, 0));
+  PetscCall(MumpsRun(d, 0));
   /* Pinned unknowns are Schur variables, and no part of this solve. */
   for (PetscInt k = 0; k < d->n_pinned && d->rank == 0; k++) d->rhs[d->pinned[k]] = 0;
-  PetscCall(Deliver(d, x));
+  PetscCall(MumpsDeliver(d, x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

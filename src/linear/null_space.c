@@ -26,7 +26,7 @@ PetscErrorCode HycoKernelSize(Mat K, PetscInt *n)
 }
 
 /* This rank's rows of the n motions, row major. */
-static PetscErrorCode Rows(PetscInt n, const Vec v[], PetscInt *rows, PetscReal **row)
+static PetscErrorCode NullSpaceRows(PetscInt n, const Vec v[], PetscInt *rows, PetscReal **row)
 {
   PetscFunctionBegin;
   PetscCall(VecGetLocalSize(v[0], rows));
@@ -44,8 +44,8 @@ static PetscErrorCode Rows(PetscInt n, const Vec v[], PetscInt *rows, PetscReal 
 
 /* The unknown with the longest row, the lowest among equals; its row, scaled to length 1, on every rank. Equal
    within 1e-10, because symmetric bodies have many such rows. Collective. */
-static PetscErrorCode Longest(MPI_Comm comm, PetscInt first, PetscInt rows, PetscInt n, const PetscReal row[],
-                              PetscInt *at, PetscReal unit[])
+static PetscErrorCode NullSpaceLongestRow(MPI_Comm comm, PetscInt first, PetscInt rows, PetscInt n,
+                                          const PetscReal row[], PetscInt *at, PetscReal unit[])
 {
   PetscReal best = 0, largest;
   PetscInt mine = PETSC_MAX_INT;
@@ -79,11 +79,11 @@ PetscErrorCode HycoMotionPins(PetscInt n, const Vec v[], PetscInt pinned[])
   PetscFunctionBegin;
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecGetOwnershipRange(v[0], &first, NULL));
-  PetscCall(Rows(n, v, &rows, &row));
+  PetscCall(NullSpaceRows(n, v, &rows, &row));
   PetscCall(PetscMalloc1(n, &unit));
   for (PetscInt p = 0; p < n; p++) { /* pivoted Gram-Schmidt on the rows */
     /* The row that is largest over all ranks; ties go to the smallest number. */
-    PetscCall(Longest(PetscObjectComm((PetscObject)v[0]), first, rows, n, row, &pinned[p], unit));
+    PetscCall(NullSpaceLongestRow(PetscObjectComm((PetscObject)v[0]), first, rows, n, row, &pinned[p], unit));
     /* What the pin holds is removed from the other rows. */
     for (PetscInt i = 0; i < rows; i++) {
       PetscReal dot = 0;
@@ -209,9 +209,9 @@ PetscErrorCode HycoMotionRows(Mat B, PetscInt p, const Vec z[], Vec work, PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The elimination that finds w leaves more round-off than the sum of its terms, and a body that loads in equilibrium with
-   themselves do not move would be pushed by it. Only where w is small: elsewhere it keeps its digits. Springs on a motion
-   do work on the deformation of the body too, which the sum lacks. */
+/* The elimination that finds w leaves more round-off than the sum of its terms, and a body that loads in equilibrium
+   with themselves do not move would be pushed by it. Only where w is small: elsewhere it keeps its digits. Springs on a
+   motion do work on the deformation of the body too, which the sum lacks. */
 PetscErrorCode HycoMotionClean(PetscInt n, const Vec v[], const PetscReal stiffness[], const PetscInt pinned[], Vec F,
                                PetscReal least, PetscReal w[])
 {

@@ -44,7 +44,7 @@ static PetscErrorCode LocalGraph(Mat K, PetscInt bs, PetscInt *n_nodes, PetscInt
 
 /* METIS on the whole graph: from degree and neighbours of each node to place[node]. On rank 0. METIS has 32-bit
    indices in most builds. */
-static PetscErrorCode Dissect(PetscInt n, const PetscInt degree[], const PetscInt next[], PetscInt place[])
+static PetscErrorCode OrderingDissect(PetscInt n, const PetscInt degree[], const PetscInt next[], PetscInt place[])
 {
   idx_t nv = (idx_t)n, *xadj, *adjncy, *perm, *iperm;
   int status;
@@ -77,7 +77,7 @@ PetscErrorCode HycoDissection(MPI_Comm comm, Mat K, PetscInt place[])
   PetscCall(HycoConcatenate(comm, n_nodes, start, MPIU_INT, sizeof(PetscInt), &n_all, &degree));
   HycoFreeAll(&start, &next);
   if (HycoRank(comm) == 0) PetscCall(PetscMalloc1(n_all, &node));
-  HycoOnRoot(comm, Dissect(n_all, degree, edges, node));
+  HycoOnRoot(comm, OrderingDissect(n_all, degree, edges, node));
   for (PetscInt i = 0; i < n_all; i++) {
     /* Nodes are ordered, unknowns of a node follow each other: a third of the graph. */
     for (PetscInt c = 0; c < bs; c++) place[i * bs + c] = node[i] * bs + c;

@@ -20,8 +20,8 @@ void HycoAddProduct(PetscReal a, PetscReal b, PetscReal sum[2])
 }
 
 /* r = b + low - K x, rounded once at the end. */
-static void Residual(PetscBLASInt n, const PetscReal K[], PetscBLASInt lda, const PetscReal b[], const PetscReal low[],
-                     const PetscReal x[], PetscReal r[])
+static void RefineResidual(PetscBLASInt n, const PetscReal K[], PetscBLASInt lda, const PetscReal b[],
+                           const PetscReal low[], const PetscReal x[], PetscReal r[])
 {
   for (PetscBLASInt i = 0; i < n; i++) {
     PetscReal sum[2] = {b[i], low ? low[i] : 0};
@@ -45,7 +45,7 @@ PetscErrorCode HycoRefine(PetscBLASInt n, const PetscReal K[], PetscBLASInt lda,
     PetscReal change = 0, size = 0;
 
     /* In twice the working precision: otherwise refinement would stop at the error of the residual. */
-    Residual(n, K, lda, b, low, x, r);
+    RefineResidual(n, K, lda, b, low, x, r);
     LAPACKgetrs_("N", &n, &one, lu, &n, ipiv, r, &n, &info);
     for (PetscBLASInt i = 0; i < n; i++) {
       change = PetscMax(change, PetscAbsReal(r[i]));

@@ -22,7 +22,7 @@ typedef struct {
 } Bracket;
 
 /* Every eighth step is a bisection, so that no law, however stiff, can stall the iteration. */
-static PetscBool Advance(Bracket *b, PetscReal newton, PetscReal *q)
+static PetscBool FlowAdvance(Bracket *b, PetscReal newton, PetscReal *q)
 {
   const PetscReal old = *q;
   const PetscBool inside = (PetscBool)(newton > b->lo && newton < b->hi);
@@ -93,7 +93,7 @@ static void IterateCreep(const HycoFlowRule *rule, Radial *w)
     return;
   } else
     w->b.hi = old;
-  w->done = Advance(&w->b, newton, &w->q);
+  w->done = FlowAdvance(&w->b, newton, &w->q);
   /* Only after a step of Newton's: after a bisection the tangent at the old q says nothing about the new one. */
   if (w->done && w->q == newton) {
     const PetscReal power = old * w->slope / w->creep, change = (w->q - old) / old;
@@ -132,13 +132,13 @@ static PetscReal SolveYield(const HycoFlowRule *rule, const Radial *w, PetscReal
       b.hi = q;
     else
       b.lo = q;
-    done = Advance(&b, q - excess / (1 + *hardening * (1 / w->H + *slope)), &q);
+    done = FlowAdvance(&b, q - excess / (1 + *hardening * (1 / w->H + *slope)), &q);
   }
 }
 
 /* The flow of a point after the solution for creep alone. Slope: derivative of the flow by q_tr, for the consistent
    tangent. */
-static Flow Solve(const HycoFlowRule *rule, const Radial *w)
+static Flow FlowSolve(const HycoFlowRule *rule, const Radial *w)
 {
   Flow f = {w->q, w->creep, 0, 0};
   PetscReal slope = w->slope, hardening = 0, yield = -1;
@@ -159,8 +159,8 @@ static Flow Solve(const HycoFlowRule *rule, const Radial *w)
 
 /* Trial stress without flow, deviator first: returns q_tr; s[n_strain]: the deviator, *pressure: the mean. Shear
    strains are engineering ones (twice the tensor's), hence G and the factor 2 in the sum. */
-static PetscReal Trial(PetscInt ns, PetscReal G, PetscReal bulk, const PetscReal elastic[], PetscReal s[],
-                       PetscReal *pressure)
+static PetscReal FlowTrial(PetscInt ns, PetscReal G, PetscReal bulk, const PetscReal elastic[], PetscReal s[],
+                           PetscReal *pressure)
 {
   const PetscReal trace = elastic[0] + elastic[1] + elastic[2];
   PetscReal sum = 0;
@@ -180,8 +180,8 @@ static PetscReal Trial(PetscInt ns, PetscReal G, PetscReal bulk, const PetscReal
 
 /* C - 6 G^2 r I_dev - 4 G^2 (slope - r) N N with r = dp / q_tr, N = 3/2 s / q. The consistent tangent: quadratic
    convergence of Newton's method needs the derivative of the algorithm, not that of the rate law. */
-static void Tangent(PetscInt ns, PetscReal G, PetscReal bulk, PetscReal slope, PetscReal r, const PetscReal N[],
-                    PetscReal C[])
+static void FlowTangent(PetscInt ns, PetscReal G, PetscReal bulk, PetscReal slope, PetscReal r, const PetscReal N[],
+                        PetscReal C[])
 {
   const PetscReal shear = G - 3 * G * G * r, normal = bulk - 2 * shear / 3, along = 4 * G * G * (slope - r);
 
@@ -197,8 +197,8 @@ static void Tangent(PetscInt ns, PetscReal G, PetscReal bulk, PetscReal slope, P
 /* A point's energies: elastic, dissipated, and the potential, which is elastic plus that of the flow at this stress.
    The dissipation is the trapezoidal rule of stress times inelastic strain; the potential exists if the rule's
    integrals do. */
-static void Energies(const HycoFlowRule *rule, const HycoFlowPoint *p, HycoMaterialPoints *m, PetscInt i, const Flow *f,
-                     PetscReal elastic)
+static void FlowEnergies(const HycoFlowRule *rule, const HycoFlowPoint *p, HycoMaterialPoints *m, PetscInt i,
+                         const Flow *f, PetscReal elastic)
 {
   const PetscInt ns = m->n_strain, n_state = ns + 2;
   PetscReal sum = 0;
@@ -218,7 +218,7 @@ static void Energies(const HycoFlowRule *rule, const HycoFlowPoint *p, HycoMater
 
 /* The trial state of point i. State: inelastic strain, accumulated creep, accumulated plastic strain. Constants 0
    and 1 are Young's modulus and Poisson's ratio; in 1D the stress alone counts. */
-static void Begin(const HycoMaterialPoints *m, PetscInt i, Radial *w)
+static void FlowBegin(const HycoMaterialPoints *m, PetscInt i, Radial *w)
 {
   const PetscInt ns = m->n_strain;
   const PetscReal young = m->constant[0][i], poisson = m->constant[1][i], G = young / (2 * (1 + poisson));
@@ -235,17 +235,17 @@ static void Begin(const HycoMaterialPoints *m, PetscInt i, Radial *w)
     w->trial = PetscAbsReal(w->s[0]);
     w->pressure = 0;
   } else
-    w->trial = Trial(ns, G, young / (3 * (1 - 2 * poisson)), elastic, w->s, &w->pressure);
+    w->trial = FlowTrial(ns, G, young / (3 * (1 - 2 * poisson)), elastic, w->s, &w->pressure);
 }
 
 /* Sets point i at the end of the step. Stress, state and tangent from the equivalent stress, radially along the
    trial deviator. */
-static void Finish(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscInt i, const Radial *w)
+static void FlowFinish(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscInt i, const Radial *w)
 {
   const PetscInt ns = m->n_strain;
   const PetscReal young = m->constant[0][i], poisson = m->constant[1][i], *strain = m->strain + i * ns;
   const PetscReal *state0 = m->state0 + i * (ns + 2);
-  const Flow f = Solve(rule, w);
+  const Flow f = FlowSolve(rule, w);
   /* 3/2 s/q_tr is the flow direction of von Mises; in 1D the sign of the stress. Without a trial stress there is no
      direction, and nothing flows. */
   const PetscReal dp = f.creep + f.plastic, unit = w->trial > 0 ? (ns == 1 ? 1.0 : 1.5) / w->trial : 0;
@@ -264,13 +264,13 @@ static void Finish(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscInt i, 
   if (m->tangent && ns == 1) m->tangent[i] = young - young * young * f.slope;
   /* At rest dp / q_tr has the limit of the slope, so that the tangent is continuous there. */
   else if (m->tangent)
-    Tangent(ns, young / (2 * (1 + poisson)), young / (3 * (1 - 2 * poisson)), f.slope,
-            w->trial > 0 ? dp / w->trial : f.slope, N, m->tangent + i * ns * ns);
-  if (m->stored) Energies(rule, &w->p, m, i, &f, energy);
+    FlowTangent(ns, young / (2 * (1 + poisson)), young / (3 * (1 - 2 * poisson)), f.slope,
+                w->trial > 0 ? dp / w->trial : f.slope, N, m->tangent + i * ns * ns);
+  if (m->stored) FlowEnergies(rule, &w->p, m, i, &f, energy);
 }
 
 /* The data of point i. */
-static void Take(const HycoFlowRule *rule, const HycoMaterialPoints *m, PetscInt i, HycoFlowPoint *p)
+static void FlowPointLocal(const HycoFlowRule *rule, const HycoMaterialPoints *m, PetscInt i, HycoFlowPoint *p)
 {
   const PetscReal *accumulated = m->state0 + i * (m->n_strain + 2) + m->n_strain;
 
@@ -295,13 +295,13 @@ static void UpdateBlock(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscIn
     Radial *w = &work[k];
     const char *why = NULL;
 
-    Take(rule, m, i, &w->p);
+    FlowPointLocal(rule, m, i, &w->p);
     if (rule->prepare) (*rule->prepare)(&w->p, &why);
     if (why && m->failed < 0) {
       m->failed = i;
       m->why = why;
     }
-    Begin(m, i, w);
+    FlowBegin(m, i, w);
   }
   for (PetscInt k = 0; k < n; k++) {
     /* The points that iterate are kept in a dense list: those that are done cost nothing. */
@@ -318,7 +318,7 @@ static void UpdateBlock(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscIn
     left = still;
   }
   for (PetscInt k = 0; k < n; k++) {
-    Finish(rule, m, first + k, &work[k]);
+    FlowFinish(rule, m, first + k, &work[k]);
     /* Any component of a stress that is not finite has made all of them so: the first is enough. The comparison also
        fails for NaN. */
     if (m->failed >= 0 || PetscAbsReal(m->stress[(first + k) * ns]) < PETSC_INFINITY) continue;
@@ -334,7 +334,7 @@ void HycoFlowUpdate(const HycoFlowRule *rule, HycoMaterialPoints *m)
 }
 /* -- end: in exported models too -- */
 
-static PetscErrorCode Update(HycoMaterial material, HycoMaterialPoints *m)
+static PetscErrorCode FlowUpdate(HycoMaterial material, HycoMaterialPoints *m)
 {
   PetscFunctionBegin;
   HycoFlowUpdate((const HycoFlowRule *)material->data, m);
@@ -348,15 +348,16 @@ static PetscErrorCode Update(HycoMaterial material, HycoMaterialPoints *m)
 #define BORDER   1e-8   /* share of the yield stress: less beyond or below it is round-off */
 
 /* How far a direction of change goes for RELATIVE of the data, from what it has gone so far. */
-static void Reach(PetscReal value, PetscReal change, PetscReal *reach)
+static void FlowStepLength(PetscReal value, PetscReal change, PetscReal *reach)
 {
   const PetscReal own = value != 0 ? PetscAbsReal(value) : 1;
 
   if (change != 0) *reach = PetscMin(*reach, RELATIVE * own / PetscAbsReal(change));
 }
 
-/* The derivatives of the creep strain at the stress q, and of the yield stress at the plastic strain x, by the data alone. */
-static void ByData(const HycoFlowRule *rule, const HycoFlowPoint *p, const HycoMaterialSlope *d, PetscInt i,
+/* The derivatives of the creep strain at the stress q, and of the yield stress at the plastic strain x, by the data
+   alone. */
+static void ByData(const HycoFlowRule *rule, const HycoFlowPoint *p, const HycoMaterialDerivative *d, PetscInt i,
                    PetscReal creep0, PetscReal q, PetscReal x, PetscReal *creep, PetscReal *yield)
 {
   HycoFlowPoint change = {.temperature = d->constant && d->temperature ? d->temperature[i] : 0,
@@ -367,10 +368,10 @@ static void ByData(const HycoFlowRule *rule, const HycoFlowPoint *p, const HycoM
   if (!d->constant && !rule->hardens) return;
   for (PetscInt j = 0; j < rule->n_constants && d->constant; j++) {
     change.c[j] = d->constant[2 + j][i];
-    Reach(p->c[j], change.c[j], &reach);
+    FlowStepLength(p->c[j], change.c[j], &reach);
   }
-  Reach(p->temperature, change.temperature, &reach);
-  Reach(p->creep0, change.creep0, &reach);
+  FlowStepLength(p->temperature, change.temperature, &reach);
+  FlowStepLength(p->creep0, change.creep0, &reach);
   if (reach == PETSC_MAX_REAL) return;
   for (int side = 0; side < 2; side++) {
     const PetscReal step = side ? reach : -reach;
@@ -395,8 +396,9 @@ typedef struct {
   PetscBool yields;                                              /* the equations are those of yielding */
 } Solved;
 
-/* As the step has decided: on the border, where the plastic strain is round-off, by the solution for creep alone again. */
-static PetscBool Yields(const HycoFlowRule *rule, Solved *s)
+/* As the step has decided: on the border, where the plastic strain is round-off, by the solution for creep alone
+   again. */
+static PetscBool FlowIsYielding(const HycoFlowRule *rule, Solved *s)
 {
   PetscReal before, hardening;
   Radial w = s->w;
@@ -416,9 +418,9 @@ static void TakeSolved(const HycoFlowRule *rule, const HycoMaterialPoints *m, Pe
                   *state = m->state + i * (ns + 2);
   const char *why = NULL;
 
-  Take(rule, m, i, &s->w.p);
+  FlowPointLocal(rule, m, i, &s->w.p);
   if (rule->prepare) (*rule->prepare)(&s->w.p, &why);
-  Begin(m, i, &s->w);
+  FlowBegin(m, i, &s->w);
   s->G = young / (2 * (1 + poisson));
   s->bulk = young / (3 * (1 - 2 * poisson));
   s->creep = state[ns] - state0[ns];
@@ -429,12 +431,12 @@ static void TakeSolved(const HycoFlowRule *rule, const HycoMaterialPoints *m, Pe
   /* At rest: whether creep begins in proportion to the stress. */
   if (rule->creep && s->w.p.dt > 0) (void)(*rule->creep)(&s->w.p, s->w.trial > 0 ? s->q : REST, &s->slope);
   if (rule->yield) s->yield = (*rule->yield)(&s->w.p, state[ns + 1], &s->hardening);
-  s->yields = Yields(rule, s);
+  s->yields = FlowIsYielding(rule, s);
 }
 
 /* Along direction d: the derivatives of q + H (creep + plastic) = q_tr, and of q = Y where plastic strain flows. */
-static void Slope(const HycoFlowRule *rule, const HycoMaterialPoints *m, PetscInt i, const Solved *s,
-                  HycoMaterialSlope *d)
+static void FlowDerivative(const HycoFlowRule *rule, const HycoMaterialPoints *m, PetscInt i, const Solved *s,
+                           HycoMaterialDerivative *d)
 {
   const PetscInt ns = m->n_strain;
   const PetscReal young = m->constant[0][i], poisson = m->constant[1][i], *strain = m->strain + i * ns,
@@ -514,9 +516,9 @@ static void Slope(const HycoFlowRule *rule, const HycoMaterialPoints *m, PetscIn
   }
 }
 
-/* A HycoMaterialSlopes. */
-static PetscErrorCode Slopes(HycoMaterial material, const HycoMaterialPoints *m, PetscBool fresh, void *solved,
-                             HycoMaterialSlope *d)
+/* A HycoMaterialDerivatives. */
+static PetscErrorCode FlowDerivatives(HycoMaterial material, const HycoMaterialPoints *m, PetscBool fresh, void *solved,
+                                      HycoMaterialDerivative *d)
 {
   const HycoFlowRule *rule = (const HycoFlowRule *)material->data;
   Solved *s = (Solved *)solved;
@@ -524,7 +526,7 @@ static PetscErrorCode Slopes(HycoMaterial material, const HycoMaterialPoints *m,
   PetscFunctionBegin;
   for (PetscInt i = 0; i < m->n; i++) {
     if (fresh) TakeSolved(rule, m, i, &s[i]);
-    Slope(rule, m, i, &s[i], d);
+    FlowDerivative(rule, m, i, &s[i], d);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -542,7 +544,7 @@ static PetscErrorCode SetUp(HycoMaterial material, PetscInt dim)
     PetscCall(PetscSNPrintf(text[c], sizeof(text[c]), "inelastic_%s", component[c]));
     name[c] = text[c];
   }
-  /* After the tensor, as Begin() and the update read them. */
+  /* After the tensor, as FlowBegin() and the update read them. */
   name[ns] = "creep_strain";
   name[ns + 1] = "plastic_strain";
   PetscCall(HycoMaterialSetStateNames(material, ns + 2, name));
@@ -550,7 +552,7 @@ static PetscErrorCode SetUp(HycoMaterial material, PetscInt dim)
 }
 
 /* The elastic part depends on young and poisson. */
-static PetscBool Depends(HycoMaterial material, const PetscBool changed[])
+static PetscBool FlowDepends(HycoMaterial material, const PetscBool changed[])
 {
   (void)material;
   return (PetscBool)(changed[0] || changed[1]);
@@ -560,12 +562,12 @@ static PetscBool Depends(HycoMaterial material, const PetscBool changed[])
 PetscErrorCode HycoFlowEnd(HycoMaterial material, const HycoFlowRule *rule)
 {
   static const struct _HycoMaterialOps ops = {
-      .setup = SetUp, .update = Update, .isotropic = HycoElasticLame, .depends = Depends};
+      .setup = SetUp, .update = FlowUpdate, .isotropic = HycoElasticLame, .depends = FlowDepends};
 
   PetscFunctionBegin;
   PetscCall(HycoMaterialSetLinear(material, PETSC_FALSE));
   material->data = (void *)(uintptr_t)rule;
-  material->slopes = Slopes;
+  material->slopes = FlowDerivatives;
   material->solved_size = sizeof(Solved);
   PetscCall(HycoMaterialSetOps(material, &ops));
   PetscFunctionReturn(PETSC_SUCCESS);

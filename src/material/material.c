@@ -404,7 +404,7 @@ PetscErrorCode HycoMaterialConstants(HycoMaterial material, const PetscReal mu[]
 
 /* The tangents of a law that is not linear: its instantaneous response at rest, without strain, state and time. The
    elastic response of an inelastic law, for supports, K and models that are linear. */
-static PetscErrorCode RestTangents(HycoMaterial material, HycoMaterialPoints *p)
+static PetscErrorCode ResidualTangents(HycoMaterial material, HycoMaterialPoints *p)
 {
   const PetscInt n = p->n * (3 * p->n_strain + 2 * material->n_state);
   PetscReal *zero;
@@ -466,7 +466,7 @@ PetscErrorCode HycoMaterialTangents(HycoMaterial material, PetscInt dim, const P
   else if (material->linear)
     PetscCall(HycoMaterialUpdate(material, &p));
   else
-    PetscCall(RestTangents(material, &p));
+    PetscCall(ResidualTangents(material, &p));
   if (material->ops->isotropic && HycoMaterialTangentSize(material, dim) != 2) ExpandAll(dim, n, tangent);
   for (PetscInt i = 0; i < n && p.failed < 0 && !material->ops->isotropic; i++) {
     /* Isotropic ones are definite by the intervals of their constants, checked above. */

@@ -23,7 +23,7 @@ PetscErrorCode HycoPlexSendTags(DM from, PetscSF sf, DM to)
 }
 
 /* Replaces a DM by its distributed version (NULL: none). */
-static PetscErrorCode Replace(DM *dm, PetscSF sf, DM by)
+static PetscErrorCode DistributeReplace(DM *dm, PetscSF sf, DM by)
 {
   HycoTies ties;
 
@@ -60,7 +60,7 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
     /* Without overlap: it follows below, once the cells are refined. */
     PetscCall(HycoPartitionerSetMesh(partitioner, whole, n_pairs, pairs, by));
     PetscCall(DMPlexDistribute(*dm, 0, &sf, &next));
-    PetscCall(Replace(dm, sf, next));
+    PetscCall(DistributeReplace(dm, sf, next));
   }
   PetscCall(HycoPlexRefine(dm, scene, scene->refine));
   HycoCheck(!overlap || !write[0],
@@ -79,7 +79,7 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
   }
   PetscCall(DMSetBasicAdjacency(*dm, PETSC_FALSE, PETSC_TRUE)); /* cells that share a vertex are neighbours */
   PetscCall(DMPlexDistributeOverlap(*dm, 1, &sf, &next));
-  PetscCall(Replace(dm, sf, next));
+  PetscCall(DistributeReplace(dm, sf, next));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

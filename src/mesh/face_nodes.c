@@ -18,7 +18,7 @@ typedef struct {
 
 /* Orders by corners first, so that all requests for one position are contiguous whatever element makes them;
    group, element and face only make the order total, as qsort() is not stable. */
-static int Compare(const void *a, const void *b)
+static int FaceNodesCompare(const void *a, const void *b)
 {
   const PetscInt *p = (const PetscInt *)a, *q = (const PetscInt *)b; /* all members of Wanted are PetscInt */
 
@@ -38,7 +38,7 @@ static PetscBool AreOne(const Wanted *a, const Wanted *b)
 }
 
 /* The nodes that determine the new node's position: n corners, then *n_sides middles of sides. */
-static PetscInt Around(const HycoMsh *mesh, const Wanted *w, PetscInt node[20], PetscInt *n_sides)
+static PetscInt FaceNodesAround(const HycoMsh *mesh, const Wanted *w, PetscInt node[20], PetscInt *n_sides)
 {
   const HycoMshGroup *g = &mesh->group[w->group];
   const PetscInt *of = g->node + w->element * g->nv, n = w->face == MIDDLE ? 8 : 4;
@@ -52,22 +52,22 @@ static PetscInt Around(const HycoMsh *mesh, const Wanted *w, PetscInt node[20], 
 }
 
 /* Whether a group has such elements; how many nodes each needs. */
-static PetscInt Wants(const HycoMshGroup *g)
+static PetscInt FaceNodesNeeded(const HycoMshGroup *g)
 {
   return g->dim == 3 && g->nv == 20 ? 7 : g->dim == 2 && g->nv == 8 ? 1 : 0;
 }
 
 /* All of them; those at one position are contiguous. The caller frees them. */
-static PetscErrorCode Collect(const HycoMsh *mesh, PetscInt *n, Wanted **list)
+static PetscErrorCode FaceNodesCollect(const HycoMsh *mesh, PetscInt *n, Wanted **list)
 {
   PetscInt room = 0;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < mesh->n_groups; k++) room += mesh->group[k].n * Wants(&mesh->group[k]);
+  for (PetscInt k = 0; k < mesh->n_groups; k++) room += mesh->group[k].n * FaceNodesNeeded(&mesh->group[k]);
   PetscCall(PetscMalloc1(room, list));
   *n = 0;
   for (PetscInt k = 0; k < mesh->n_groups; k++) {
-    const PetscInt each = Wants(&mesh->group[k]);
+    const PetscInt each = FaceNodesNeeded(&mesh->group[k]);
 
     for (PetscInt j = 0; j < mesh->group[k].n * each; j++) {
       Wanted *w = &(*list)[(*n)++];
@@ -77,21 +77,21 @@ static PetscErrorCode Collect(const HycoMsh *mesh, PetscInt *n, Wanted **list)
       w->element = j / each;
       /* A quadrilateral of the boundary is its own face; a hexahedron has six. */
       w->face = each == 1 ? ITSELF : j % each;
-      n_corners = Around(mesh, w, node, &n_sides);
+      n_corners = FaceNodesAround(mesh, w, node, &n_sides);
       for (PetscInt c = 0; c < CORNERS; c++) w->corner[c] = c < n_corners ? node[c] : -1;
       /* Sorted corners name the position, whichever element looks at it. */
       PetscCall(PetscSortInt(n_corners, w->corner));
     }
   }
-  if (*n) qsort(*list, (size_t)*n, sizeof(Wanted), Compare);
+  if (*n) qsort(*list, (size_t)*n, sizeof(Wanted), FaceNodesCompare);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The middle of a face or a cell by the serendipity functions. */
-static void Place(const HycoMsh *mesh, const Wanted *w, PetscReal x[3])
+static void FaceNodesPosition(const HycoMsh *mesh, const Wanted *w, PetscReal x[3])
 {
   PetscInt node[20], n_sides;
-  const PetscInt n = Around(mesh, w, node, &n_sides);
+  const PetscInt n = FaceNodesAround(mesh, w, node, &n_sides);
 
   for (PetscInt c = 0; c < 3; c++) {
     x[c] = 0;
@@ -102,9 +102,9 @@ static void Place(const HycoMsh *mesh, const Wanted *w, PetscReal x[3])
 }
 
 /* Extends a group's elements by the nodes they need. */
-static PetscErrorCode Widen(HycoMshGroup *g)
+static PetscErrorCode FaceNodesWiden(HycoMshGroup *g)
 {
-  const PetscInt nv = g->nv + Wants(g);
+  const PetscInt nv = g->nv + FaceNodesNeeded(g);
   PetscInt *node;
 
   PetscFunctionBegin;
@@ -129,7 +129,7 @@ PetscErrorCode HycoMshAddFaceNodes(const char path[], HycoMsh *mesh)
   PetscInt n = 0, added = 0, at = mesh->n_nodes;
 
   PetscFunctionBegin;
-  PetscCall(Collect(mesh, &n, &list));
+  PetscCall(FaceNodesCollect(mesh, &n, &list));
   for (PetscInt k = 0; k < n; k++) added += !k || !AreOne(&list[k], &list[k - 1]);
   /* Before anything is changed: PETSC_MAX_INT itself is a sentinel (AddNode() in msh.c). */
   if (at && mesh->tag[at - 1] >= PETSC_MAX_INT - 1 - added) {
@@ -141,12 +141,12 @@ PetscErrorCode HycoMshAddFaceNodes(const char path[], HycoMsh *mesh)
   PetscCall(PetscRealloc((size_t)(3 * (at + added)) * sizeof(*mesh->xyz), &mesh->xyz));
   for (PetscInt k = 0; k < n; k++) {
     if (k && AreOne(&list[k], &list[k - 1])) continue;
-    Place(mesh, &list[k], mesh->xyz + 3 * at);
+    FaceNodesPosition(mesh, &list[k], mesh->xyz + 3 * at);
     mesh->tag[at] = mesh->tag[at - 1] + 1;
     at++;
   }
-  /* Not earlier: Place() reads groups of the old width. */
-  for (PetscInt k = 0; k < mesh->n_groups; k++) PetscCall(Widen(&mesh->group[k]));
+  /* Not earlier: FaceNodesPosition() reads groups of the old width. */
+  for (PetscInt k = 0; k < mesh->n_groups; k++) PetscCall(FaceNodesWiden(&mesh->group[k]));
   /* The second pass counts positions as the first one did, and so finds each new node's index. */
   at = mesh->n_nodes - 1;
   for (PetscInt k = 0; k < n; k++) {

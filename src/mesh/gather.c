@@ -1,7 +1,7 @@
 /*
-  Gathers chosen cells, facets and nodes of a distributed mesh on rank 0. Each rank cuts the DM of its share, whose points
-  migrate to rank 0 (DMPlexMigrate()); the submesh is made of them. A share has the cells of facets too, since a facet is
-  a label's value of its cell. To migrate from the whole DM would cost its size for every label.
+  Gathers chosen cells, facets and nodes of a distributed mesh on rank 0. Each rank cuts the DM of its share, whose
+  points migrate to rank 0 (DMPlexMigrate()); the submesh is made of them. A share has the cells of facets too, since a
+  facet is a label's value of its cell. To migrate from the whole DM would cost its size for every label.
 */
 #include "plex.h"
 
@@ -22,7 +22,7 @@ typedef struct {
 } Gather;
 
 /* Combines the values of a point on all ranks that have it. */
-static PetscErrorCode Agree(const Gather *g, MPI_Op op, PetscInt value[])
+static PetscErrorCode GatherAgree(const Gather *g, MPI_Op op, PetscInt value[])
 {
   PetscInt n_roots;
   PetscSF sf;
@@ -42,7 +42,7 @@ static PetscErrorCode Agree(const Gather *g, MPI_Op op, PetscInt value[])
 }
 
 /* Finds what each point of the part is. */
-static PetscErrorCode Choose(Gather *g)
+static PetscErrorCode GatherChoose(Gather *g)
 {
   HycoMesh m = g->part;
   PetscInt *kind, node[HYCO_MAX_CELL_NODES];
@@ -64,7 +64,7 @@ static PetscErrorCode Choose(Gather *g)
   }
   /* First pass: chosen points over all ranks. A cell's nodes follow in a second pass at every rank that has the
      cell, because the owner of a node need not have the group's facet in its tables. */
-  PetscCall(Agree(g, MPI_MAX, kind));
+  PetscCall(GatherAgree(g, MPI_MAX, kind));
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const PetscInt n = HycoMeshCellNodes(m, e, node), of = kind[m->cell_point[e]];
 
@@ -77,7 +77,7 @@ static PetscErrorCode Choose(Gather *g)
       *master = PetscMax(*master, kind[m->node_point[m->tied[k]]]);
     }
   }
-  PetscCall(Agree(g, MPI_MAX, kind));
+  PetscCall(GatherAgree(g, MPI_MAX, kind));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -119,7 +119,7 @@ static PetscErrorCode AddFacets(const Gather *g, PetscInt n, const PetscInt poin
     }
     /* A facet is in the tables of ranks that own one of its nodes; the cell may be sent by another rank. The bits
        of all of them are combined at the cell. */
-    PetscCall(Agree(g, MPI_BOR, facets));
+    PetscCall(GatherAgree(g, MPI_BOR, facets));
     PetscCall(HycoPlexGroupLabel(g->share, m->group_name[k], &label));
     for (PetscInt c = 0; c < n; c++) {
       for (PetscInt number = 0; facets[point[c]] >> number; number++) {
@@ -131,7 +131,8 @@ static PetscErrorCode AddFacets(const Gather *g, PetscInt n, const PetscInt poin
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets the point star forest of the shares, from that of the mesh: nodes of other ranks' are leaves. own[]: the others. */
+/* Sets the point star forest of the shares, from that of the mesh: nodes of other ranks' are leaves. own[]: the
+   others. */
 static PetscErrorCode SetPointSF(const Gather *g, PetscInt n, const PetscInt point[], PetscBool own[])
 {
   PetscInt *at, *leaf, n_roots, n_leaves, n_mine = 0, v0;
@@ -236,7 +237,7 @@ static PetscErrorCode SendColumns(Gather *g, PetscSF sf, PetscInt n, const Petsc
 
 /* Sends the points of the shares, with tags and ties. DMPlex moves points, cones and labels; tags and ties are not
    known to it. */
-static PetscErrorCode Migrate(Gather *g)
+static PetscErrorCode GatherMigrate(Gather *g)
 {
   PetscBool *own;
   PetscInt n;
@@ -268,7 +269,7 @@ static PetscErrorCode Migrate(Gather *g)
 }
 
 /* Adds the numbers in the distributed mesh: rank 0 has all nodes. */
-static PetscErrorCode Number(const Gather *g, HycoMesh sub)
+static PetscErrorCode GatherNumbers(const Gather *g, HycoMesh sub)
 {
   HycoMesh m = g->part;
   const PetscInt *point;
@@ -322,7 +323,7 @@ static PetscErrorCode MakeSubmesh(const Gather *g, HycoMesh *sub)
   HycoFinally(HycoSubmesh(g->scene, m, n_keep, keep, n_extra, extra, n_all, all, sub),
               PetscCall(PetscFree3(keep, extra, all));
               PetscCall(HycoMeshDestroy(&m)));
-  PetscCall(Number(g, *sub));
+  PetscCall(GatherNumbers(g, *sub));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -337,10 +338,10 @@ PetscErrorCode HycoMeshGather(HycoScene scene, HycoMesh part, const PetscBool in
   PetscFunctionBegin;
   *mesh = NULL;
   PetscCallMPI(MPI_Comm_rank(g.comm, &g.rank));
-  PetscCall(Choose(&g));
+  PetscCall(GatherChoose(&g));
   /* Each rank cuts its own points before they travel. */
   PetscCall(CutShare(&g));
-  PetscCall(Migrate(&g));
+  PetscCall(GatherMigrate(&g));
   HycoOnRoot(g.comm, MakeSubmesh(&g, mesh));
   for (PetscInt c = 0; c < N_COLUMNS; c++) PetscCall(PetscFree(g.of[c]));
   PetscCall(PetscFree(g.kind));

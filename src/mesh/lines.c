@@ -12,7 +12,7 @@ typedef struct {
 } Edge;
 
 /* By keys alone: equal keys are the same edge, with the same middle node. */
-static int Ascending(const void *a, const void *b)
+static int LinesAscending(const void *a, const void *b)
 {
   const PetscInt64 x = ((const Edge *)a)->key, y = ((const Edge *)b)->key;
 
@@ -51,7 +51,7 @@ static PetscErrorCode FindEdges(HycoMesh m, const PetscBool in[], PetscInt *n, E
     HycoGrow(count, room, *edge);
     (*edge)[count++] = e;
   }
-  if (count) qsort(*edge, (size_t)count, sizeof(**edge), Ascending);
+  if (count) qsort(*edge, (size_t)count, sizeof(**edge), LinesAscending);
   for (PetscInt k = 0; k < count; k++) {
     if (!k || (*edge)[k].key != (*edge)[k - 1].key) (*edge)[(*n)++] = (*edge)[k];
   }

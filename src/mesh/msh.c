@@ -166,8 +166,8 @@ static PetscErrorCode AddCoordinates(Msh *m, size_t k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Format 2.2: 28 bytes a node in binary files, at least 8 characters in text, which bounds a declared number by the file's
-   size. */
+/* Format 2.2: 28 bytes a node in binary files, at least 8 characters in text, which bounds a declared number by the
+   file's size. */
 static PetscErrorCode ReadNodes2(Msh *m)
 {
   size_t n;
@@ -340,7 +340,7 @@ static const char *TypeName(long long type)
 
 /* Widens a group, or an element of nv nodes that is to be added, so that both have the same number. Shapes with fewer
    nodes repeat nodes; a group has one number of nodes for all of its elements. */
-static PetscErrorCode Match(Msh *m, HycoMshGroup *g, PetscInt nv, PetscInt node[])
+static PetscErrorCode MshMatch(Msh *m, HycoMshGroup *g, PetscInt nv, PetscInt node[])
 {
   const HycoCellType has = HycoMshType(g->dim, g->nv), own = HycoMshType(g->dim, nv);
   const HycoCellType both = has < HYCO_N_CELL_TYPES && own < HYCO_N_CELL_TYPES
@@ -371,7 +371,7 @@ static PetscErrorCode AddElement(Msh *m, HycoMshGroup *g, long long tag, long lo
      body reads. */
   g->shapes |= (PetscInt)1 << HycoMshType(g->dim, nv);
   /* Either the group or the element gets wider, so that all rows of node[] have one length. */
-  if (g->n && g->nv != nv) PetscCall(Match(m, g, nv, node));
+  if (g->n && g->nv != nv) PetscCall(MshMatch(m, g, nv, node));
   if (!g->n) g->nv = nv;
   nv = g->nv;
   if (g->n == g->room) {
@@ -508,8 +508,8 @@ static PetscErrorCode ReadBlock4(Msh *m, long long dim, long long entity, long l
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Format 4.1: blocks of elements of one entity and type. The declared numbers are compared with what the blocks have, since
-   a truncated file may end at a block. */
+/* Format 4.1: blocks of elements of one entity and type. The declared numbers are compared with what the blocks have,
+   since a truncated file may end at a block. */
 static PetscErrorCode ReadElements4(Msh *m)
 {
   size_t blocks, n, all, done = 0;

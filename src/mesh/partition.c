@@ -164,7 +164,7 @@ typedef struct {
 } Data;
 
 /* METIS fails for graphs that PT-Scotch divides; the fallback keeps the run alive. */
-static PetscErrorCode Cut(const Data *d, PetscInt n_parts, PetscInt part[])
+static PetscErrorCode PartitionCut(const Data *d, PetscInt n_parts, PetscInt part[])
 {
   Graph graph;
   PetscBool done = PETSC_FALSE;
@@ -183,9 +183,9 @@ static PetscErrorCode Cut(const Data *d, PetscInt n_parts, PetscInt part[])
 
 /* Lists the cells by part. The operation of a PetscPartitioner: sizes per part, and the cells grouped by part,
    ascending in each. All cells are on rank 0; other ranks have n = 0. */
-static PetscErrorCode Partition(PetscPartitioner partitioner, PetscInt n_parts, PetscInt n, PetscInt start[],
-                                PetscInt adjacent[], PetscSection weights,
-                                HYCO_EDGE_WEIGHTS_ARGUMENT PetscSection targets, PetscSection sizes, IS *partition)
+static PetscErrorCode PartitionCells(PetscPartitioner partitioner, PetscInt n_parts, PetscInt n, PetscInt start[],
+                                     PetscInt adjacent[], PetscSection weights,
+                                     HYCO_EDGE_WEIGHTS_ARGUMENT PetscSection targets, PetscSection sizes, IS *partition)
 {
   Data *d = (Data *)partitioner->data;
   PetscInt *part, *cells, at = 0;
@@ -193,7 +193,7 @@ static PetscErrorCode Partition(PetscPartitioner partitioner, PetscInt n_parts, 
   PetscFunctionBegin;
   (void)start, (void)adjacent, (void)weights, (void)targets;
   PetscCall(PetscMalloc1(n, &part));
-  HycoOnEach(PetscObjectComm((PetscObject)partitioner), n && d->mesh ? Cut(d, n_parts, part) : PETSC_SUCCESS);
+  HycoOnEach(PetscObjectComm((PetscObject)partitioner), n && d->mesh ? PartitionCut(d, n_parts, part) : PETSC_SUCCESS);
   for (PetscInt c = 0; c < n; c++) PetscCall(PetscSectionAddDof(sizes, part[c], 1));
   PetscCall(PetscMalloc1(n, &cells));
   for (PetscInt p = 0; p < n_parts; p++) {
@@ -208,7 +208,7 @@ static PetscErrorCode Partition(PetscPartitioner partitioner, PetscInt n_parts, 
 }
 
 /* Only the copy of Data is owned, not what it points to. */
-static PetscErrorCode Destroy(PetscPartitioner partitioner)
+static PetscErrorCode PartitionDestroy(PetscPartitioner partitioner)
 {
   PetscFunctionBegin;
   PetscCall(PetscFree(partitioner->data));
@@ -217,7 +217,7 @@ static PetscErrorCode Destroy(PetscPartitioner partitioner)
 
 /* Called by PetscPartitionerSetType(), before HycoPartitionerSetMesh() fills the data. Registered as a type of
    PetscPartitioner, so that DMPlexDistribute() uses it. */
-static PetscErrorCode Create(PetscPartitioner partitioner)
+static PetscErrorCode PartitionCreate(PetscPartitioner partitioner)
 {
   Data *d;
 
@@ -225,8 +225,8 @@ static PetscErrorCode Create(PetscPartitioner partitioner)
   PetscCall(PetscNew(&d));
   partitioner->data = d;
   partitioner->noGraph = PETSC_TRUE; /* DMPlex's graph would have an edge for each vertex that two cells share */
-  partitioner->ops->partition = Partition;
-  partitioner->ops->destroy = Destroy;
+  partitioner->ops->partition = PartitionCells;
+  partitioner->ops->destroy = PartitionDestroy;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -240,7 +240,7 @@ PetscErrorCode HycoPartitionerSetMesh(PetscPartitioner partitioner, HycoMesh mes
   PetscFunctionBegin;
   /* PETSc replaces an entry of the same name. The type is set in code, so that -petscpartitioner_type has no effect
      here. */
-  PetscCall(PetscPartitionerRegister(HYCO_PARTITIONER, Create));
+  PetscCall(PetscPartitionerRegister(HYCO_PARTITIONER, PartitionCreate));
   PetscCall(PetscPartitionerSetType(partitioner, HYCO_PARTITIONER));
   *(Data *)partitioner->data = data;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -246,7 +246,7 @@ static PetscErrorCode FindType(Builder *b)
 }
 
 /* place[k]: the index of the k-th smallest tag; a submesh is in order. */
-static PetscErrorCode Order(const Builder *b, PetscInt n, const PetscInt key[], PetscInt place[])
+static PetscErrorCode PlexOrder(const Builder *b, PetscInt n, const PetscInt key[], PetscInt place[])
 {
   PetscBool sorted;
 
@@ -295,8 +295,8 @@ static PetscErrorCode FollowedVertices(const Builder *b, PetscInt cell, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Collects the cells that touch a vertex owned by this process, by tag: those that contribute to its rows. The outer part
-   of the overlap is dropped, which would only cost assembly. */
+/* Collects the cells that touch a vertex owned by this process, by tag: those that contribute to its rows. The outer
+   part of the overlap is dropped, which would only cost assembly. */
 static PetscErrorCode TakeCells(Builder *b)
 {
   HycoMesh m = b->m;
@@ -323,7 +323,7 @@ static PetscErrorCode TakeCells(Builder *b)
     key[n] = b->tag[c];
     keep[n++] = c;
   }
-  PetscCall(Order(b, n, key, place));
+  PetscCall(PlexOrder(b, n, key, place));
   m->n_cells = n;
   PetscCall(PetscMalloc1(n, &b->m->cell_point));
   PetscCall(PetscMalloc1(n, &m->cell_id));
@@ -367,7 +367,7 @@ static PetscErrorCode TakeNodes(Builder *b)
     key[n] = b->tag[v];
     keep[n++] = v;
   }
-  PetscCall(Order(b, n, key, place));
+  PetscCall(PlexOrder(b, n, key, place));
   m->n_nodes = n;
   PetscCall(PetscMalloc1(n, &b->m->node_point));
   PetscCall(PetscMalloc1(n, &m->node_id));
@@ -395,7 +395,7 @@ static PetscErrorCode TakeNodes(Builder *b)
 
 /* Reverses the orientation of a facet: its corners, of a face from the first on, and the middles of its sides, of
    which the k-th follows the k-th corner. */
-static void Reverse(HycoCellType type, PetscInt facet[])
+static void PlexReverse(HycoCellType type, PetscInt facet[])
 {
   const PetscInt corners = HycoCellKinds[type].corners, first = corners > 2;
 
@@ -439,7 +439,7 @@ static void TurnOutward(HycoMesh m, PetscInt cell, PetscInt facet[])
   /* Against the cell's mean node: true for convex cells, and independent of the file's orientation, which gmsh does
      not guarantee. */
   for (PetscInt c = 0; c < 3; c++) out += normal[c] * (p[c] - inside[c]);
-  if (out < 0) Reverse(m->type, facet);
+  if (out < 0) PlexReverse(m->type, facet);
 }
 
 /* Outward for facets with a cell here; one without it keeps the order that it got when it had the cell. */
@@ -783,7 +783,7 @@ static PetscErrorCode MakeTables(Builder *b)
 }
 
 /* Numbers in the distributed vectors, by a section of the unknowns; places in the whole mesh, by tag. */
-static PetscErrorCode Number(Builder *b)
+static PetscErrorCode PlexNumberNodes(Builder *b)
 {
   const MPI_Comm comm = PetscObjectComm((PetscObject)b->dm);
   HycoMesh m = b->m;
@@ -873,7 +873,7 @@ static PetscErrorCode FillTables(Builder *b, MPI_Comm comm)
   if (!b->part &&
       (scene->dm || (length > 3 && strcmp(scene->mesh_path + length - 3, ".h5") == 0))) /* not yet checked */
     PetscCall(CheckGroups(comm, b->m, scene));
-  if (size > 1) PetscCall(Number(b));
+  if (size > 1) PetscCall(PlexNumberNodes(b));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

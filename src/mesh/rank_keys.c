@@ -4,7 +4,7 @@
 #include <stdlib.h>
 
 /* By comparison: a difference would overflow for keys that are products of tags. */
-static int Compare(const void *a, const void *b)
+static int RankKeysCompare(const void *a, const void *b)
 {
   const PetscInt64 x = *(const PetscInt64 *)a, y = *(const PetscInt64 *)b;
 
@@ -12,14 +12,14 @@ static int Compare(const void *a, const void *b)
 }
 
 /* start[r]: the first item of process r, which has counts[r]; start[size]: their number. */
-static void Offsets(PetscMPIInt size, const PetscMPIInt counts[], PetscMPIInt start[])
+static void RankKeysOffsets(PetscMPIInt size, const PetscMPIInt counts[], PetscMPIInt start[])
 {
   start[0] = 0;
   for (PetscMPIInt r = 0; r < size; r++) start[r + 1] = start[r] + counts[r];
 }
 
-/* The places of the n keys that this process sorts, among its own; *n_own of them are different. A copy is sorted, as the
-   places are needed in the order of the keys. */
+/* The places of the n keys that this process sorts, among its own; *n_own of them are different. A copy is sorted, as
+   the places are needed in the order of the keys. */
 static PetscErrorCode RankOwn(PetscInt n, const PetscInt64 key[], PetscInt place[], PetscInt *n_own)
 {
   PetscInt64 *sorted;
@@ -27,13 +27,13 @@ static PetscErrorCode RankOwn(PetscInt n, const PetscInt64 key[], PetscInt place
 
   PetscFunctionBegin;
   HycoDuplicate(n, key, &sorted);
-  if (n) qsort(sorted, (size_t)n, sizeof(*sorted), Compare);
+  if (n) qsort(sorted, (size_t)n, sizeof(*sorted), RankKeysCompare);
   for (PetscInt k = 0; k < n; k++) {
     /* Equal keys get one place. */
     if (!k || sorted[k] != sorted[m - 1]) sorted[m++] = sorted[k];
   }
   for (PetscInt k = 0; k < n; k++)
-    place[k] = (PetscInt)((PetscInt64 *)bsearch(&key[k], sorted, (size_t)m, sizeof(*sorted), Compare) - sorted);
+    place[k] = (PetscInt)((PetscInt64 *)bsearch(&key[k], sorted, (size_t)m, sizeof(*sorted), RankKeysCompare) - sorted);
   *n_own = m;
   PetscCall(PetscFree(sorted));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -57,15 +57,15 @@ PetscErrorCode HycoRankKeys(MPI_Comm comm, PetscInt n, const PetscInt64 key[], P
   PetscCall(PetscCalloc4(size, &n_send, size, &n_receive, size + 1, &send, size + 1, &receive));
   for (PetscInt k = 0; k < n; k++) n_send[key[k] / share]++;
   PetscCallMPI(MPI_Alltoall(n_send, 1, MPI_INT, n_receive, 1, MPI_INT, comm));
-  Offsets(size, n_send, send);
-  Offsets(size, n_receive, receive);
+  RankKeysOffsets(size, n_send, send);
+  RankKeysOffsets(size, n_receive, receive);
   PetscCall(PetscMalloc4(n, &out, n, &at, n, &back, receive[size], &in));
   PetscCall(PetscMalloc1(receive[size], &ranked));
   for (PetscInt k = 0; k < n; k++) { /* send[r] advances to the end of r's keys, and is reset below */
     at[k] = send[key[k] / share]++;
     out[at[k]] = key[k];
   }
-  Offsets(size, n_send, send);
+  RankKeysOffsets(size, n_send, send);
   PetscCallMPI(MPI_Alltoallv(out, n_send, send, MPIU_INT64, in, n_receive, receive, MPIU_INT64, comm));
   PetscCall(RankOwn(receive[size], in, ranked, &n_own));
   /* Process r has the r-th part of the range, so that the number of different keys before it is a sum over lower

@@ -17,7 +17,7 @@ static PetscErrorCode FacetPoint(DM dm, HycoCellType type, PetscInt nv, PetscInt
 {
   const PetscInt *cone;
   const signed char *of = HycoFacetNodes(type, number);
-  /* Room for first order alone: Interpolate() refuses other meshes. */
+  /* Room for first order alone: RefineMeshInterpolate() refuses other meshes. */
   PetscInt vertex[8], n;
 
   PetscFunctionBegin;
@@ -88,7 +88,7 @@ typedef struct {
 } Asked;
 
 /* A visitor of HycoSceneVisitGroups(): groups that the scene does not name may be of any kind. */
-static PetscErrorCode Compare(const char key[], const char name[], void *context)
+static PetscErrorCode RefineMeshCompare(const char key[], const char name[], void *context)
 {
   Asked *asked = (Asked *)context;
 
@@ -106,7 +106,7 @@ static PetscErrorCode CheckVertices(DM dm, HycoScene scene, const char name[], D
   Asked asked = {name, PETSC_FALSE};
 
   PetscFunctionBegin;
-  PetscCall(HycoSceneVisitGroups(scene, Compare, &asked));
+  PetscCall(HycoSceneVisitGroups(scene, RefineMeshCompare, &asked));
   if (!asked.named) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(DMPlexGetDepthStratum(dm, 0, &v0, &v1));
   /* Values 1 + dimension of groups of lines, surfaces and volumes; points (1) are kept as they are. */
@@ -133,7 +133,7 @@ static PetscErrorCode CheckVertices(DM dm, HycoScene scene, const char name[], D
 /* Interpolates the DM, and its labels of facets. Groups are rebuilt: edges and faces are not in the labels yet, and
    facets change from values of cells to points. Vertices and cells keep their numbers, thus also their tags.
    Collective. */
-static PetscErrorCode Interpolate(DM *dm, HycoScene scene)
+static PetscErrorCode RefineMeshInterpolate(DM *dm, HycoScene scene)
 {
   const MPI_Comm comm = PetscObjectComm((PetscObject)*dm);
   PetscInt n, last, *tag, dim, depth, type;
@@ -202,7 +202,8 @@ static PetscErrorCode CountChildren(DMPlexTransform transform, PetscInt p, DMPol
 }
 
 /* The key that identifies a new vertex on a point: the tags of two vertices, or a cell's. */
-static PetscErrorCode Key(DM dm, const PetscInt tag[], PetscInt p, PetscInt depth, PetscInt dim, PetscInt64 *key)
+static PetscErrorCode RefineMeshKey(DM dm, const PetscInt tag[], PetscInt p, PetscInt depth, PetscInt dim,
+                                    PetscInt64 *key)
 {
   PetscInt vertex[4], least = 0;
   /* An edge: its two ends. A quadrilateral: its smallest vertex and the opposite one, which no other face shares
@@ -228,7 +229,7 @@ static PetscErrorCode TagMiddles(DM dm, DMPlexTransform transform, const PetscIn
   PetscInt64 *key;
 
   PetscFunctionBegin;
-  /* Key() has 31 bits for a tag. */
+  /* RefineMeshKey() has 31 bits for a tag. */
   HycoCheck(*last <= 0x7fffffff, "the mesh has node numbers above 2147483647 and is not refined; refine the file");
   PetscCall(DMGetDimension(dm, &dim));
   PetscCall(DMPlexGetDepthStratum(dm, depth, &first, &end));
@@ -242,7 +243,7 @@ static PetscErrorCode TagMiddles(DM dm, DMPlexTransform transform, const PetscIn
     if (!has) continue;
     /* Triangles and tetrahedra have no vertex in their middle and are skipped above. */
     PetscCall(DMPlexTransformGetTargetPoint(transform, type, DM_POLYTOPE_POINT, p, 0, &child[n]));
-    PetscCall(Key(dm, tag, p, depth, dim, &key[n++]));
+    PetscCall(RefineMeshKey(dm, tag, p, depth, dim, &key[n++]));
   }
   PetscCall(HycoRankKeys(PetscObjectComm((PetscObject)dm), n, key, place, &total));
   HycoCheck(
@@ -427,7 +428,7 @@ PetscErrorCode HycoPlexRefine(DM *dm, HycoScene scene, PetscInt times)
   HycoOnEach(PetscObjectComm((PetscObject)*dm), CheckShapes(*dm));
   PetscCall(CheckMemory(*dm, times));
   PetscCall(SortByType(dm));
-  PetscCall(Interpolate(dm, scene));
+  PetscCall(RefineMeshInterpolate(dm, scene));
   for (PetscInt k = 0; k < times; k++) PetscCall(RefineOnce(dm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

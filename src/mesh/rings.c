@@ -39,7 +39,7 @@ static int CompareThree(const void *a, const void *b)
 }
 
 /* Replaces the rows by those that this rank receives, sorted by their first three entries, each once. */
-static PetscErrorCode Exchange(MPI_Comm comm, Rows *r)
+static PetscErrorCode RingsExchange(MPI_Comm comm, Rows *r)
 {
   PetscInt *got, n = 0, n_got;
 
@@ -64,7 +64,7 @@ typedef struct {
 } List;
 
 /* Counts (item NULL) or lists an item at a node. */
-static void Note(List *list, PetscInt node, PetscInt item)
+static void RingsListItem(List *list, PetscInt node, PetscInt item)
 {
   if (!list->item)
     list->start[node + 1]++;
@@ -91,9 +91,9 @@ static void NoteFacets(Packing *p)
 
     /* Groups that no contact reads stay at home. */
     if (!p->in[m->facet_group[k / m->nf]]) continue;
-    Note(&p->facets, i, k / m->nf);
+    RingsListItem(&p->facets, i, k / m->nf);
     for (PetscInt j = tied < 0 ? 0 : m->tied_start[tied]; tied >= 0 && j < m->tied_start[tied + 1]; j++)
-      Note(&p->facets, m->tied_master[j], k / m->nf);
+      RingsListItem(&p->facets, m->tied_master[j], k / m->nf);
   }
 }
 
@@ -103,7 +103,7 @@ static void NoteGroups(Packing *p)
   HycoMesh m = p->part;
 
   for (PetscInt g = 0; g < m->n_groups; g++) {
-    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) Note(&p->groups, m->group_node[j], g);
+    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) RingsListItem(&p->groups, m->group_node[j], g);
   }
 }
 
@@ -184,7 +184,7 @@ static PetscErrorCode PackFacet(Packing *p, PetscMPIInt to, PetscInt f)
 }
 
 /* Packs the answer to the requests (rank, number of a node in the distributed vectors), in the order of the ranks. */
-static PetscErrorCode Pack(Packing *p, PetscInt n, const PetscInt request[])
+static PetscErrorCode RingsPack(Packing *p, PetscInt n, const PetscInt request[])
 {
   HycoMesh m = p->part;
 
@@ -210,7 +210,7 @@ static PetscErrorCode Pack(Packing *p, PetscInt n, const PetscInt request[])
 }
 
 /* Rows of nodes arrive sorted by tag; bisection gives the index. */
-static PetscInt Find(HycoMesh m, PetscInt tag)
+static PetscInt RingsFind(HycoMesh m, PetscInt tag)
 {
   PetscInt at = -1;
 
@@ -256,7 +256,7 @@ static PetscErrorCode PlaceCells(HycoMesh m, const Rows *r)
     m->cell_id[e] = row[0];
     m->cell_body[e] = row[3];
     m->cell_whole[e] = row[4];
-    for (PetscInt v = 0; v < m->nv; v++) m->cells[e * m->nv + v] = Find(m, row[5 + v]);
+    for (PetscInt v = 0; v < m->nv; v++) m->cells[e * m->nv + v] = RingsFind(m, row[5 + v]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -276,7 +276,7 @@ static PetscErrorCode PlaceFacets(HycoMesh m, const Rows *r)
     m->facet_cell[f] = -1;
     /* Cells arrive in 1D alone; elsewhere the facet has no cell. */
     if (m->n_cells) PetscCall(PetscFindInt(row[1], m->n_cells, m->cell_id, &m->facet_cell[f]));
-    for (PetscInt v = 0; v < m->nf; v++) m->facets[f * m->nf + v] = Find(m, row[3 + v]);
+    for (PetscInt v = 0; v < m->nf; v++) m->facets[f * m->nf + v] = RingsFind(m, row[3 + v]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -296,7 +296,7 @@ static PetscErrorCode PlaceGroups(HycoMesh m, HycoMesh part, const Rows *r)
   /* Members are sorted by group, then tag: already CSR. */
   for (PetscInt k = 0; k < r->n; k++) {
     m->group_start[r->row[k * r->width] + 1]++;
-    m->group_node[k] = Find(m, r->row[k * r->width + 1]);
+    m->group_node[k] = RingsFind(m, r->row[k * r->width + 1]);
   }
   for (PetscInt g = 0; g < m->n_groups; g++) m->group_start[g + 1] += m->group_start[g];
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -353,12 +353,12 @@ PetscErrorCode HycoMeshRings(MPI_Comm comm, HycoScene scene, HycoMesh part, cons
   p.member.width = 3;
   p.facet.width = 3 + part->nf;
   p.cell.width = 5 + part->nv;
-  PetscCall(Pack(&p, n_asked, asked));
+  PetscCall(RingsPack(&p, n_asked, asked));
   PetscCall(PetscFree(asked));
-  PetscCall(Exchange(comm, &p.node));
-  PetscCall(Exchange(comm, &p.member));
-  PetscCall(Exchange(comm, &p.facet));
-  PetscCall(Exchange(comm, &p.cell));
+  PetscCall(RingsExchange(comm, &p.node));
+  PetscCall(RingsExchange(comm, &p.member));
+  PetscCall(RingsExchange(comm, &p.facet));
+  PetscCall(RingsExchange(comm, &p.cell));
   PetscCall(MakeMesh(&p, mesh));
   PetscCall(HycoMeshCreateDM(scene, *mesh));
   HycoFreeAll(&p.node.row, &p.node.to, &p.member.row, &p.member.to, &p.facet.row, &p.facet.to, &p.cell.row, &p.cell.to);

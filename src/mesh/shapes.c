@@ -17,7 +17,7 @@ HycoCellType HycoShapesType(PetscInt shapes)
 }
 
 /* The node of the smaller cell at each place of the wider one; none is after its place. */
-static const signed char *Places(HycoCellType shape)
+static const signed char *ShapesPositions(HycoCellType shape)
 {
   static const signed char triangle[4] = {0, 1, 2, 2}, tetrahedron[8] = {0, 1, 2, 2, 3, 3, 3, 3},
                            pyramid[8] = {0, 1, 2, 3, 4, 4, 4, 4}, prism[8] = {0, 1, 2, 2, 3, 4, 5, 5};
@@ -39,7 +39,7 @@ static const signed char *Places(HycoCellType shape)
 /* From the last place to the first, so that the copy may be in place: no node moves to an earlier place. */
 void HycoShapeWiden(HycoCellType shape, PetscInt nv, PetscInt node[])
 {
-  const signed char *places = HycoCellKinds[shape].nv < nv ? Places(shape) : NULL;
+  const signed char *places = HycoCellKinds[shape].nv < nv ? ShapesPositions(shape) : NULL;
 
   for (PetscInt k = nv - 1; places && k >= 0; k--) node[k] = node[places[k]];
 }

@@ -1,9 +1,10 @@
 /*
-  DMs from tables: of a whole mesh, and submeshes, which are chosen cells, facets and nodes of another mesh. DMPlexFilter()
-  takes cells alone; here a facet without its cell is a point of its own, whose cone is its nodes in the order of its
-  normal. It has the tag of the cell that it bounds, and in the labels of its groups the value HYCO_FACET + its number in
-  that cell, as if it were this cell. Points are numbered cells, such facets, nodes; the subpoint IS gives the point of the
-  other mesh, of such a facet its cell. (PETSc's subpoint map is a label, in which a point occurs once.)
+  DMs from tables: of a whole mesh, and submeshes, which are chosen cells, facets and nodes of another mesh.
+  DMPlexFilter() takes cells alone; here a facet without its cell is a point of its own, whose cone is its nodes in the
+  order of its normal. It has the tag of the cell that it bounds, and in the labels of its groups the value HYCO_FACET +
+  its number in that cell, as if it were this cell. Points are numbered cells, such facets, nodes; the subpoint IS gives
+  the point of the other mesh, of such a facet its cell. (PETSc's subpoint map is a label, in which a point occurs
+  once.)
 */
 #include "plex.h"
 #include <string.h>
@@ -30,7 +31,7 @@ static PetscErrorCode CutDestroy(Cut *c)
 }
 
 /* 0..n-1; the caller frees it. */
-static PetscErrorCode Identity(PetscInt n, PetscInt **a)
+static PetscErrorCode SubmeshIdentity(PetscInt n, PetscInt **a)
 {
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n, a));
@@ -43,10 +44,10 @@ static PetscErrorCode CutAll(HycoMesh m, Cut *c)
 {
   PetscFunctionBegin;
   *c = (Cut){.of = m, .n_cells = m->n_cells, .n_nodes = m->n_nodes};
-  PetscCall(Identity(m->n_cells, &c->cell));
-  PetscCall(Identity(m->n_nodes, &c->node));
-  PetscCall(Identity(m->n_cells, &c->cell_at));
-  PetscCall(Identity(m->n_nodes, &c->node_at));
+  PetscCall(SubmeshIdentity(m->n_cells, &c->cell));
+  PetscCall(SubmeshIdentity(m->n_nodes, &c->node));
+  PetscCall(SubmeshIdentity(m->n_cells, &c->cell_at));
+  PetscCall(SubmeshIdentity(m->n_nodes, &c->node_at));
   PetscCall(PetscMalloc1(m->n_facets, &c->facet));
   for (PetscInt f = 0; f < m->n_facets; f++) {
     /* Facets with a cell follow from it. */
@@ -390,9 +391,10 @@ static PetscErrorCode SelectNodes(Cut *c, PetscBool ascending, PetscInt n_extra,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a facet is taken without its cell: n_all ALL_BETWEEN: if all of its nodes are in extra, the first ones; else if
-   its group is listed. */
-static PetscBool Takes(HycoMesh m, PetscInt facet, PetscInt n_extra, PetscInt n_all, const PetscInt all_facets[])
+/* Whether a facet is taken without its cell: n_all ALL_BETWEEN: if all of its nodes are in extra, the first ones; else
+   if its group is listed. */
+static PetscBool SubmeshIsTaken(HycoMesh m, PetscInt facet, PetscInt n_extra, PetscInt n_all,
+                                const PetscInt all_facets[])
 {
   PetscBool take = (PetscBool)(n_all == ALL_BETWEEN);
 
@@ -402,8 +404,8 @@ static PetscBool Takes(HycoMesh m, PetscInt facet, PetscInt n_extra, PetscInt n_
 }
 
 /* Facets that are taken and whose cell is not kept become points. */
-static PetscErrorCode Select(Cut *c, PetscInt n_keep, const PetscInt keep[], PetscInt n_extra, const PetscInt extra[],
-                             PetscInt n_all, const PetscInt all_facets[])
+static PetscErrorCode SubmeshSelect(Cut *c, PetscInt n_keep, const PetscInt keep[], PetscInt n_extra,
+                                    const PetscInt extra[], PetscInt n_all, const PetscInt all_facets[])
 {
   HycoMesh m = c->of;
 
@@ -417,7 +419,7 @@ static PetscErrorCode Select(Cut *c, PetscInt n_keep, const PetscInt keep[], Pet
   PetscCall(PetscMalloc1(m->n_facets, &c->facet));
   for (PetscInt f = 0; f < m->n_facets; f++) {
     if (m->facet_cell[f] >= 0 && c->cell_at[m->facet_cell[f]] >= 0) continue;
-    if (Takes(m, f, n_extra, n_all, all_facets)) c->facet[c->n_facets++] = f;
+    if (SubmeshIsTaken(m, f, n_extra, n_all, all_facets)) c->facet[c->n_facets++] = f;
   }
   PetscCall(SelectNodes(c, (PetscBool)(n_all == ALL_BETWEEN), n_extra, extra));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -453,8 +455,8 @@ static PetscErrorCode SetPoints(DM sub, const Cut *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A DM of the chosen points, with what the whole mesh's DM has composed with it: ties, labels of groups, tags, the points in
-   the whole mesh, the type of its cells. */
+/* A DM of the chosen points, with what the whole mesh's DM has composed with it: ties, labels of groups, tags, the
+   points in the whole mesh, the type of its cells. */
 static PetscErrorCode MakeDM(MPI_Comm comm, const Cut *c, DM *dm)
 {
   PetscFunctionBegin;
@@ -475,14 +477,14 @@ PetscErrorCode HycoPlexCut(MPI_Comm comm, HycoScene scene, HycoMesh of, PetscInt
   Cut cut = {.of = of, .scene = scene};
 
   PetscFunctionBegin;
-  PetscCall(Select(&cut, n_keep, keep, n_extra, extra, n_all, all_facets));
+  PetscCall(SubmeshSelect(&cut, n_keep, keep, n_extra, extra, n_all, all_facets));
   PetscCall(MakeDM(comm, &cut, dm));
   PetscCall(CutDestroy(&cut));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Local tables of the submesh on this process, with the places in the whole mesh, which the DM does not store. */
-static PetscErrorCode Make(const Cut *c, HycoMesh *sub)
+static PetscErrorCode SubmeshMake(const Cut *c, HycoMesh *sub)
 {
   HycoMesh m = c->of;
   DM dm;
@@ -508,8 +510,8 @@ PetscErrorCode HycoSubmesh(HycoScene scene, HycoMesh of, PetscInt n_keep, const 
   Cut cut = {.of = of, .scene = scene};
 
   PetscFunctionBegin;
-  PetscCall(Select(&cut, n_keep, keep, n_extra, extra, n_all, all_facets));
-  HycoFinally(Make(&cut, sub), PetscCall(CutDestroy(&cut)));
+  PetscCall(SubmeshSelect(&cut, n_keep, keep, n_extra, extra, n_all, all_facets));
+  HycoFinally(SubmeshMake(&cut, sub), PetscCall(CutDestroy(&cut)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -520,7 +522,7 @@ PetscErrorCode HycoSubmeshFirst(HycoScene scene, HycoMesh of, PetscInt n, HycoMe
   HycoMesh m;
 
   PetscFunctionBegin;
-  PetscCall(Identity(PetscMax(n, of->n_cells), &first));
+  PetscCall(SubmeshIdentity(PetscMax(n, of->n_cells), &first));
   PetscCall(HycoSubmesh(scene, of, of->n_cells, first, n, first, ALL_BETWEEN, NULL, sub));
   PetscCall(PetscFree(first));
   m = *sub;
@@ -546,7 +548,7 @@ PetscErrorCode HycoMeshCreateDM(HycoScene scene, HycoMesh m)
   PetscCall(MakeDM(PETSC_COMM_SELF, &cut, &dm));
   PetscCall(HycoMeshSetDM(m, dm));
   /* Points are numbered cells, facets without cells, nodes: as MakeDM() makes them. */
-  PetscCall(Identity(m->n_cells, &m->cell_point));
+  PetscCall(SubmeshIdentity(m->n_cells, &m->cell_point));
   PetscCall(PetscMalloc1(m->n_nodes, &m->node_point));
   PetscCall(PetscMalloc1(m->n_facets, &m->facet_point));
   for (PetscInt i = 0; i < m->n_nodes; i++) m->node_point[i] = cut.n_cells + cut.n_facets + i;

@@ -103,7 +103,7 @@ PetscErrorCode HycoTiesOf(DM dm, HycoTies *ties)
 }
 
 /* One past the last entry of the slave of entry k. */
-static PetscInt End(HycoTies t, PetscInt k)
+static PetscInt TieEnd(HycoTies t, PetscInt k)
 {
   PetscInt end = k + 1;
 
@@ -120,7 +120,7 @@ static PetscErrorCode FindTied(HycoMesh m, const PetscInt tag[], const PetscInt 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(m->n_nodes, &entry));
   for (PetscInt i = 0; i < m->n_nodes; i++) m->tied_at[i] = entry[i] = -1;
-  for (PetscInt k = 0; k < t->n; k = End(t, k)) {
+  for (PetscInt k = 0; k < t->n; k = TieEnd(t, k)) {
     PetscInt at;
 
     /* A negative `at`: the slave is in another part of the mesh. */
@@ -142,7 +142,7 @@ static PetscErrorCode FindTied(HycoMesh m, const PetscInt tag[], const PetscInt 
     m->tied[k] = i;
     m->tied_entry[k] = entry[i];
     m->tied_start[k + 1] = m->tied_start[k];
-    for (PetscInt j = entry[i]; j < End(t, entry[i]); j++) {
+    for (PetscInt j = entry[i]; j < TieEnd(t, entry[i]); j++) {
       PetscInt at;
 
       PetscCall(PetscFindInt(t->master[j], m->n_nodes, tag, &at));
@@ -157,7 +157,7 @@ static PetscErrorCode FindTied(HycoMesh m, const PetscInt tag[], const PetscInt 
 
 /* The masters of a cell's nodes that are not nodes of the cell, ascending; returns their number. They are the
    additional rows and columns of the cell's matrix. */
-static PetscInt Follow(HycoMesh m, PetscInt cell, PetscInt follow[])
+static PetscInt TieMasters(HycoMesh m, PetscInt cell, PetscInt follow[])
 {
   const PetscInt *own = m->cells + cell * m->nv;
   PetscInt n = 0;
@@ -183,16 +183,16 @@ static PetscInt Follow(HycoMesh m, PetscInt cell, PetscInt follow[])
 }
 
 /* By cell, the masters that its tied nodes follow; sizes first, then the lists. */
-static PetscErrorCode FindFollow(HycoMesh m)
+static PetscErrorCode FindTiedNodes(HycoMesh m)
 {
   PetscInt follow[HYCO_MAX_CELL_NODES];
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(m->n_cells + 1, &m->follow_start));
   m->follow_start[0] = 0;
-  for (PetscInt e = 0; e < m->n_cells; e++) m->follow_start[e + 1] = m->follow_start[e] + Follow(m, e, follow);
+  for (PetscInt e = 0; e < m->n_cells; e++) m->follow_start[e + 1] = m->follow_start[e] + TieMasters(m, e, follow);
   PetscCall(PetscMalloc1(m->follow_start[m->n_cells], &m->follow));
-  for (PetscInt e = 0; e < m->n_cells; e++) (void)Follow(m, e, m->follow + m->follow_start[e]);
+  for (PetscInt e = 0; e < m->n_cells; e++) (void)TieMasters(m, e, m->follow + m->follow_start[e]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -217,6 +217,6 @@ PetscErrorCode HycoMeshSetTies(HycoMesh m, HycoTies ties)
   PetscCall(FindTied(m, tag, node));
   PetscCall(PetscFree2(tag, node));
   /* The reverse lists too: which tied nodes follow a node. */
-  PetscCall(FindFollow(m));
+  PetscCall(FindTiedNodes(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -37,7 +37,7 @@ static PetscErrorCode ReadMesh(HycoReducer t)
 /* For moved surfaces, finds in t->met every contact's masters at the training points and over the ranges, as far as
    contacts may close. Rank 0. The reach comes first: it limits the search of the second to masters that a closing
    contact may meet. */
-static PetscErrorCode Meet(HycoReducer t, HycoROM m)
+static PetscErrorCode BuildMasters(HycoReducer t, HycoROM m)
 {
   HycoFOM f = t->fom;
   PetscInt n;
@@ -398,7 +398,7 @@ static PetscErrorCode FillModel(HycoReducer t, HycoROM m)
 /* Fills the report from the built model; the numbers of the last iteration of a greedy training are overwritten.
    t->columns differs from t->samples if the bases are those of held-out points: then there is no training
    solution. */
-static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
+static PetscErrorCode BuildReport(HycoReducer t, HycoROM m, HycoTraining *r)
 {
   PetscFunctionBegin;
   r->n_facts = 0; /* of the previous iteration */
@@ -510,7 +510,7 @@ static PetscErrorCode BuildModel(HycoReducer t, PetscBool useful, HycoROM m, Hyc
   PetscCall(TakeClosed(t, m));
   /* Only for a model that will be used: a greedy iteration may pass through poor ones. */
   if (useful) PetscCall(CheckUseful(t, m));
-  PetscCall(Report(t, m, report));
+  PetscCall(BuildReport(t, m, report));
   PetscCall(HycoROMReset(m));
   PetscCall(HycoOptionsInherit((PetscObject)m, (PetscObject)t));
   PetscCall(HycoROMSetFromOptions(m));
@@ -526,7 +526,7 @@ static PetscErrorCode BeginOnRoot(HycoReducer t, HycoROM *model)
   PetscFunctionBegin;
   PetscCall(HycoROMCreate(model));
   ierr = HycoROMSetType(*model, t->prototype->model->type);
-  if (!ierr) ierr = Meet(t, *model);
+  if (!ierr) ierr = BuildMasters(t, *model);
   if (ierr) (void)!HycoROMDestroy(model);
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -757,7 +757,9 @@ HycoDefineMethod(HycoReducerGetSolving, (HycoReducer t, const char *what[]), t, 
 #define MOST_HELD  30
 #define FEW_HELD   HYCO_FEW_HELD /* for types whose errors are known without them, and which are tried first */
 #define TOGETHER   3             /* that share a stiffness, if loads or gaps are parameters too */
-#define CYCLE      (4 * TOGETHER) /* after as many points of the sequence the places inside, at corners, on faces repeat */
+#define CYCLE                                                                                                          \
+  (4 * TOGETHER) /* after as many points of the sequence the places inside, at corners, on faces
+                                     repeat */
 
 static PetscInt HeldByDefault(PetscInt n)
 {
@@ -781,7 +783,7 @@ static PetscErrorCode DrawHeld(HycoReducer t, PetscInt count, PetscInt together,
   for (PetscInt p = 0; p < n_par; p++) reaches[p] = (PetscBool)slow[p];
   /* Whole cycles, so that a later draw begins with the same places and none is drawn twice. */
   t->drawn = (t->drawn + CYCLE - 1) / CYCLE * CYCLE;
-  PetscCall(HycoSamplesUnseen(t->samples, t->drawn, count, together, reaches, held));
+  PetscCall(HycoSamplesOutsideTraining(t->samples, t->drawn, count, together, reaches, held));
   t->drawn += count;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

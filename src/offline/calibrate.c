@@ -23,8 +23,8 @@ static const HycoErrorKind errors[HYCO_N_ESTIMATES] = {HYCO_ERROR_U, HYCO_ERROR_
 
 /* Median of the positive ones of value[0], value[stride], ..., or `otherwise`. Positive ones only: errors and
    features that are exactly zero would pull a floor to zero, by which they are divided. */
-static PetscErrorCode Median(PetscInt n, const PetscReal value[], PetscInt stride, PetscReal otherwise,
-                             PetscReal *median)
+static PetscErrorCode CalibrateMedian(PetscInt n, const PetscReal value[], PetscInt stride, PetscReal otherwise,
+                                      PetscReal *median)
 {
   PetscReal *positive;
   PetscInt m = 0;
@@ -42,7 +42,7 @@ static PetscErrorCode Median(PetscInt n, const PetscReal value[], PetscInt strid
 
 /* The median distance of a training point from the nearest other: the floor of the feature "distance". Twins have
    no distance from each other (d > 0), and count by their next neighbour. */
-static PetscErrorCode Spacing(HycoReducer t, PetscReal *spacing)
+static PetscErrorCode CalibrateSpacing(HycoReducer t, PetscReal *spacing)
 {
   PetscInt n, n_par;
   const PetscReal *mu;
@@ -59,7 +59,7 @@ static PetscErrorCode Spacing(HycoReducer t, PetscReal *spacing)
       if (d > 0 && (nearest[k] == 0 || d < nearest[k])) nearest[k] = d;
     }
   }
-  PetscCall(Median(n, nearest, 1, 1, spacing));
+  PetscCall(CalibrateMedian(n, nearest, 1, 1, spacing));
   PetscCall(PetscFree(nearest));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -77,8 +77,8 @@ static PetscReal MeanOf(PetscInt n, const PetscReal X[], const PetscReal law[])
 /* Replaces a formula by that of the error of u, stress or forces, raised above the errors y in the same way, if its
    mean is smaller. The error of an output has a sign and passes through zero, so that its logarithm scatters more than
    that of a norm, and coefficients fitted to it are less certain. */
-static PetscErrorCode Borrow(PetscInt n, const PetscInt group[], const PetscReal X[], const PetscReal y[],
-                             const HycoEstimates *estimates, PetscReal law[])
+static PetscErrorCode CalibrateBorrow(PetscInt n, const PetscInt group[], const PetscReal X[], const PetscReal y[],
+                                      const HycoEstimates *estimates, PetscReal law[])
 {
   PetscReal other[HYCO_ESTIMATE_FEATURES + 1];
 
@@ -96,12 +96,12 @@ static PetscErrorCode Borrow(PetscInt n, const PetscInt group[], const PetscReal
 /* Fits the formula for these errors. Those up to `least`, for example of forces without contact, contain no information
    on their size: they come last, and only raise the bound. On logarithms: errors and features span orders of magnitude,
    and their relation is nearly a power law there. */
-static PetscErrorCode Fit(PetscInt n, const HycoHeldOut rows[], const PetscReal error[], PetscReal least,
-                          const HycoEstimates *estimates, PetscBool borrow, PetscReal law[])
+static PetscErrorCode CalibrateFit(PetscInt n, const HycoHeldOut rows[], const PetscReal error[], PetscReal least,
+                                   const HycoEstimates *estimates, PetscBool borrow, PetscReal law[])
 {
   const PetscInt p = HYCO_ESTIMATE_FEATURES;
   PetscReal *X, *y;
-  PetscInt filled = 0, telling = 0, *group;
+  PetscInt filled = 0, explanatory = 0, *group;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(n * p, &X, n, &y, n, &group));
@@ -112,11 +112,11 @@ static PetscErrorCode Fit(PetscInt n, const HycoHeldOut rows[], const PetscReal 
       for (PetscInt j = 0; j < p; j++) X[filled * p + j] = PetscLogReal(1 + rows[i].feature[j] / estimates->floor[j]);
       group[filled] = (PetscInt)rows[i].group;
       y[filled++] = PetscLogReal(PetscMax(error[i], least));
-      if (pass == 0) telling = filled;
+      if (pass == 0) explanatory = filled;
     }
   }
-  PetscCall(HycoUpperBound(n, telling ? telling : n, group, p, X, y, SHARE, law));
-  if (borrow) PetscCall(Borrow(n, group, X, y, estimates, law));
+  PetscCall(HycoUpperBound(n, explanatory ? explanatory : n, group, p, X, y, SHARE, law));
+  if (borrow) PetscCall(CalibrateBorrow(n, group, X, y, estimates, law));
   law[p] += PetscLogReal(MARGIN);
   PetscCall(PetscFree3(X, y, group));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -138,17 +138,17 @@ static PetscErrorCode FitError(PetscInt n, const HycoHeldOut rows[], HycoEstimat
     if (PetscIsNanReal(error[i])) error[i] = 0;
     finite = (PetscBool)(finite && !PetscIsInfOrNanReal(error[i]));
   }
-  PetscCall(Median(n, error, 1, PETSC_SMALL, &median));
+  PetscCall(CalibrateMedian(n, error, 1, PETSC_SMALL, &median));
   estimates->has[kind] = (PetscBool)(finite && compared && (kind != HYCO_ESTIMATE_LAMBDA || estimates->force > 0));
   if (estimates->has[kind])
-    PetscCall(Fit(n, rows, error, NEGLIGIBLE * median, estimates, PETSC_FALSE, estimates->law[kind]));
+    PetscCall(CalibrateFit(n, rows, error, NEGLIGIBLE * median, estimates, PETSC_FALSE, estimates->law[kind]));
   PetscCall(PetscFree(error));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* How the errors of an output follow the field that decides it: the largest over its norm, and over its error. */
-static void Follow(PetscInt n, const HycoHeldOut rows[], const HycoOutputErrors found[], PetscInt q,
-                   const HycoScene scene, PetscReal force, HycoOutputEstimate *o)
+static void CalibrateIntegrate(PetscInt n, const HycoHeldOut rows[], const HycoOutputErrors found[], PetscInt q,
+                               const HycoScene scene, PetscReal force, HycoOutputEstimate *o)
 {
   const HycoPrediction none = {0};
   HycoEstimateKind kind;
@@ -191,20 +191,20 @@ static PetscErrorCode FitOutput(PetscInt n, const HycoHeldOut rows[], const Hyco
   PetscCall(PetscSortReal(m, sorted));
   o->median = m ? sorted[m / 2] : -1;
   o->largest = m ? sorted[m - 1] : -1;
-  Follow(n, rows, found, q, scene, estimates->force, o);
+  CalibrateIntegrate(n, rows, found, q, scene, estimates->force, o);
   /* Without calibrated features (estimates->n = 0) there is nothing to fit with. */
   o->has = (PetscBool)(m && o->magnitude > 0 && estimates->n);
-  PetscCall(Median(n, error, 1, 0, &median));
+  PetscCall(CalibrateMedian(n, error, 1, 0, &median));
   /* Smaller errors count as this one: their logarithms would only be noise. */
   least = PetscMax(NEGLIGIBLE * median, HYCO_OUTPUT_ROUND_OFF * o->magnitude);
-  if (o->has) PetscCall(Fit(n, rows, error, least, estimates, PETSC_TRUE, o->law));
+  if (o->has) PetscCall(CalibrateFit(n, rows, error, least, estimates, PETSC_TRUE, o->law));
   PetscCall(PetscFree2(error, sorted));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The smallest number of predictions for an estimate: a type that needs no formula takes a multiple of the largest of
    few errors. */
-static PetscInt Least(const HycoROM m)
+static PetscInt CalibrateLeast(const HycoROM m)
 {
   return m->model->traits.uniform ? HYCO_FEW_HELD : LEAST;
 }
@@ -219,19 +219,19 @@ static PetscErrorCode FitAll(HycoReducer t, PetscInt n, PetscInt least, const Hy
   if (n < least) PetscFunctionReturn(PETSC_SUCCESS);
   estimates->n = n;
   for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++) {
-    PetscCall(
-        Median(n, rows[0].feature + j, (PetscInt)(sizeof(*rows) / sizeof(PetscReal)), 1 / SMALL, &estimates->floor[j]));
+    PetscCall(CalibrateMedian(n, rows[0].feature + j, (PetscInt)(sizeof(*rows) / sizeof(PetscReal)), 1 / SMALL,
+                              &estimates->floor[j]));
     estimates->floor[j] *= SMALL;
   }
   /* The distance has a floor of its own: between training points it is never 0, and its median says little. */
-  PetscCall(Spacing(t, &estimates->floor[HYCO_ESTIMATE_DISTANCE]));
+  PetscCall(CalibrateSpacing(t, &estimates->floor[HYCO_ESTIMATE_DISTANCE]));
   for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) PetscCall(FitError(n, rows, (HycoEstimateKind)e, estimates));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The largest values of the features. -1: unknown. With few points the largest values say nothing about what is
    usual. */
-static void Reach(PetscInt n, PetscInt least, const HycoHeldOut rows[], PetscReal reached[])
+static void CalibrateReach(PetscInt n, PetscInt least, const HycoHeldOut rows[], PetscReal reached[])
 {
   for (PetscInt j = 0; j < HYCO_FEATURES; j++) {
     reached[j] = n >= least ? 0 : -1;
@@ -240,7 +240,7 @@ static void Reach(PetscInt n, PetscInt least, const HycoHeldOut rows[], PetscRea
 }
 
 /* Numbers the points' groups: those of one stiffness, if not all parameters affect it, are not independent. */
-static PetscErrorCode Group(HycoReducer t, HycoSamples points, PetscInt n, HycoHeldOut rows[])
+static PetscErrorCode CalibrateGroup(HycoReducer t, HycoSamples points, PetscInt n, HycoHeldOut rows[])
 {
   PetscBool reaches[HYCO_MAX_PARAMETERS];
   PetscInt n_par, n_stiff = 0;
@@ -303,8 +303,8 @@ static PetscErrorCode NameSettings(const HycoTraining *report, HycoROM m)
 /* Fits the formulas, and stores the errors in the model. Rank 0. Rank 0 alone has the model's online data; the caller
    broadcasts what other ranks report. What it learns from are predictions, not interpolations: held-out points are in
    no basis. */
-static PetscErrorCode Conclude(HycoReducer t, HycoSamples points, PetscInt n, HycoHeldOut rows[],
-                               HycoOutputErrors outputs[], HycoROM m, HycoTraining *report)
+static PetscErrorCode CalibrateConclude(HycoReducer t, HycoSamples points, PetscInt n, HycoHeldOut rows[],
+                                        HycoOutputErrors outputs[], HycoROM m, HycoTraining *report)
 {
   const HycoValidation *v = &report->held_out;
   HycoEstimates estimates = {0};
@@ -318,11 +318,11 @@ static PetscErrorCode Conclude(HycoReducer t, HycoSamples points, PetscInt n, Hy
     estimates.largest[e] = PetscIsNanReal(v->largest[errors[e]]) ? -1 : v->largest[errors[e]];
   }
   estimates.force = HycoHeldOutForce(n, rows);
-  PetscCall(Group(t, points, n, rows));
-  /* After Group(), whose numbers are those of all points. */
+  PetscCall(CalibrateGroup(t, points, n, rows));
+  /* After CalibrateGroup(), whose numbers are those of all points. */
   n = KeepConverged(n, rows, outputs);
-  Reach(n, Least(m), rows, estimates.reached);
-  PetscCall(FitAll(t, n, Least(m), rows, &estimates));
+  CalibrateReach(n, CalibrateLeast(m), rows, estimates.reached);
+  PetscCall(FitAll(t, n, CalibrateLeast(m), rows, &estimates));
   estimates.n_outputs = t->scene->n_quantities;
   for (PetscInt q = 0; q < estimates.n_outputs; q++) {
     const HycoOutputEstimate *o = &estimates.output[q];
@@ -338,8 +338,8 @@ static PetscErrorCode Conclude(HycoReducer t, HycoSamples points, PetscInt n, Hy
 
 #define CORNERS 3 /* held-out points for each corner that judges too */
 
-/* Spread over them. The held-out points of a training on a closed grid have no corner, where errors may be larger than inside
-   although the corner was trained on. */
+/* Spread over them. The held-out points of a training on a closed grid have no corner, where errors may be larger than
+   inside although the corner was trained on. */
 PetscErrorCode HycoReducerCorners(HycoReducer t, PetscInt most, HycoSamples *corners)
 {
   const HycoScene scene = t->scene;
@@ -364,7 +364,8 @@ PetscErrorCode HycoReducerCorners(HycoReducer t, PetscInt most, HycoSamples *cor
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* They enter the largest errors, not the medians: the held-out points are distributed like a user's, corners are not. */
+/* They enter the largest errors, not the medians: the held-out points are distributed like a user's, corners are
+   not. */
 PetscErrorCode HycoReducerJudgeCorners(HycoReducer t, HycoSamples corners, PetscInt n, HycoROM model,
                                        HycoSnapshots store, HycoHeldOut rows[], HycoValidation *held_out)
 {
@@ -400,8 +401,8 @@ static PetscErrorCode CountCost(HycoReducer t, PetscInt n_held, HycoSnapshots st
 }
 
 /* Fits the estimates to the errors at `points`, which are those of the n rows. */
-static PetscErrorCode Learn(HycoReducer t, HycoSamples points, PetscInt n, HycoHeldOut rows[], HycoROM model,
-                            HycoSnapshots store, HycoTraining *report)
+static PetscErrorCode CalibrateErrors(HycoReducer t, HycoSamples points, PetscInt n, HycoHeldOut rows[], HycoROM model,
+                                      HycoSnapshots store, HycoTraining *report)
 {
   HycoOutputErrors *outputs;
 
@@ -410,7 +411,7 @@ static PetscErrorCode Learn(HycoReducer t, HycoSamples points, PetscInt n, HycoH
   PetscCall(HycoReducerJudgeOutputs(t, points, model, store, rows, outputs));
   PetscCall(CountCost(t, n, store, report));
   /* Rank 0 has the rows of all points, and the fit is small. */
-  HycoOnRoot(HycoComm(t), Conclude(t, points, n, rows, outputs, model, report));
+  HycoOnRoot(HycoComm(t), CalibrateConclude(t, points, n, rows, outputs, model, report));
   PetscCallMPI(MPI_Bcast(&report->n_held, 1, MPIU_INT, 0, HycoComm(t)));
   PetscCallMPI(MPI_Bcast(report->output, sizeof(report->output), MPI_BYTE, 0, HycoComm(t)));
   PetscCall(PetscFree(outputs));
@@ -428,7 +429,7 @@ PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM 
   t->judged_held = NULL;
   if (t->held) PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoReducerCorners(t, t->validation || n < Least(model) ? 0 : n / CORNERS, &corners));
+  PetscCall(HycoReducerCorners(t, t->validation || n < CalibrateLeast(model) ? 0 : n / CORNERS, &corners));
   PetscCall(HycoSamplesGet(corners, &n_corners, NULL, NULL));
   /* The training points were not solved: their corners are now. */
   if (t->late && n_corners) PetscCall(HycoReducerSolve(t, store, corners));
@@ -444,7 +445,7 @@ PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM 
   PetscCall(HycoSamplesCreate(t->scene, &all));
   PetscCall(HycoSamplesAddSet(all, t->held));
   PetscCall(HycoSamplesAddSet(all, corners));
-  PetscCall(Learn(t, all, n + n_corners, rows, model, store, report));
+  PetscCall(CalibrateErrors(t, all, n + n_corners, rows, model, store, report));
   HycoDestroyAll(&all, &corners);
   PetscCall(PetscFree(rows));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,10 +1,10 @@
 /*
   Which settings of a search are chosen, and which can no longer be chosen. `ratio` is the largest quotient of an error
   and its target; for an attempt that was dropped, a lower bound of it. The choice is the cheapest attempt whose ratio
-  is at most max(1, LITTLE times the least ratio), but does not miss a limit if another does not. This bound only decreases with further attempts: settings that exceed
-  it are excluded for good. So are settings whose ratio exceeds 1 and the ratio of settings that are not more expensive:
-  if those are excluded, so are these; and settings that cost no less than
-  others that meet the targets, whatever their errors, which are then not computed.
+  is at most max(1, LITTLE times the least ratio), but does not miss a limit if another does not. This bound only
+  decreases with further attempts: settings that exceed it are excluded for good. So are settings whose ratio exceeds 1
+  and the ratio of settings that are not more expensive: if those are excluded, so are these; and settings that cost no
+  less than others that meet the targets, whatever their errors, which are then not computed.
 */
 #include <hycoreducerimpl.h>
 
@@ -15,17 +15,18 @@
 
 /* Whether it gave a model that was judged at all held-out points, or as far as necessary: a path that does not reach
    its end has the worst ratio. */
-static PetscBool Complete(const HycoAttempt *a)
+static PetscBool AttemptComplete(const HycoAttempt *a)
 {
   return (PetscBool)(!a->failure[0] && !a->beaten_by);
 }
 
-/* The largest ratio that may be chosen (above): max(1, LITTLE times the least), but below HYCO_MISSES if the best is. */
-static PetscReal Bound(PetscInt n, const HycoAttempt attempt[], const HycoAttempt **best)
+/* The largest ratio that may be chosen (above): max(1, LITTLE times the least), but below HYCO_MISSES if the best
+   is. */
+static PetscReal AttemptBound(PetscInt n, const HycoAttempt attempt[], const HycoAttempt **best)
 {
   *best = NULL;
   for (PetscInt k = 0; k < n; k++) {
-    if (Complete(&attempt[k]) && (!*best || attempt[k].ratio < (*best)->ratio)) *best = &attempt[k];
+    if (AttemptComplete(&attempt[k]) && (!*best || attempt[k].ratio < (*best)->ratio)) *best = &attempt[k];
   }
   if (!*best) return PETSC_INFINITY;
   return (*best)->ratio <= HYCO_MISSES ? PetscMin(HYCO_MISSES, PetscMax(1, LITTLE * (*best)->ratio))
@@ -48,10 +49,10 @@ HycoAttempt *HycoAttemptsChoose(PetscInt n, HycoAttempt attempt[])
 {
   HycoAttempt *chosen = NULL;
   const HycoAttempt *best;
-  const PetscReal bound = Bound(n, attempt, &best);
+  const PetscReal bound = AttemptBound(n, attempt, &best);
 
   for (PetscInt k = 0; k < n; k++) {
-    if (!Complete(&attempt[k]) || attempt[k].ratio > bound) continue;
+    if (!AttemptComplete(&attempt[k]) || attempt[k].ratio > bound) continue;
     if (!chosen || attempt[k].cost < chosen->cost) chosen = &attempt[k];
   }
   return chosen;
@@ -62,13 +63,13 @@ HycoAttempt *HycoAttemptsChoose(PetscInt n, HycoAttempt attempt[])
 PetscReal HycoAttemptsLimit(PetscInt n, const HycoAttempt attempt[], PetscReal cost, PetscInt *beaten)
 {
   const HycoAttempt *by;
-  PetscReal limit = Bound(n, attempt, &by);
+  PetscReal limit = AttemptBound(n, attempt, &by);
 
   for (PetscInt k = 0; k < n; k++) {
     /* Below 1 all are equal: an attempt that meets the targets excludes dearer ones by its cost (MetFor()). */
     const PetscReal ratio = PetscMax(1, attempt[k].ratio);
 
-    if (!Complete(&attempt[k]) || attempt[k].cost > cost || ratio >= limit) continue;
+    if (!AttemptComplete(&attempt[k]) || attempt[k].cost > cost || ratio >= limit) continue;
     limit = ratio;
     by = &attempt[k];
   }
@@ -80,7 +81,7 @@ PetscReal HycoAttemptsLimit(PetscInt n, const HycoAttempt attempt[], PetscReal c
 static PetscBool IsMet(PetscInt n, const HycoAttempt attempt[], PetscReal cost)
 {
   for (PetscInt k = 0; k < n; k++) {
-    if (Complete(&attempt[k]) && attempt[k].ratio <= 1 && attempt[k].cost <= cost) return PETSC_TRUE;
+    if (AttemptComplete(&attempt[k]) && attempt[k].ratio <= 1 && attempt[k].cost <= cost) return PETSC_TRUE;
   }
   return PETSC_FALSE;
 }

@@ -58,7 +58,7 @@ static PetscErrorCode FillNotes(HycoFE fe, const PetscBool near[], PetscReal val
 
 /* These data, a column each, rows in the file's order. Collective. Volume, body and whether a cell is kept in any case,
    as columns of a matrix, so that one gathering serves for them too. */
-static PetscErrorCode Notes(HycoReducer t, const PetscBool near[], PetscInt n_rows, Mat *X)
+static PetscErrorCode WeightsData(HycoReducer t, const PetscBool near[], PetscInt n_rows, Mat *X)
 {
   HycoFE fe = t->fom->fe;
   PetscReal *value, *rows;
@@ -108,8 +108,9 @@ static void FillSystem(PetscInt n_cells, PetscInt n, const PetscReal vectors[], 
 }
 
 /* The relative errors of the weights on all n vectors' integrals, and on the volumes. */
-static void Measure(PetscInt n_cells, PetscInt n, const PetscReal vectors[], const PetscReal sigma[], PetscInt n_bodies,
-                    const PetscReal volume[], const PetscReal body[], const PetscReal w[], PetscReal error[2])
+static void WeightsMeasure(PetscInt n_cells, PetscInt n, const PetscReal vectors[], const PetscReal sigma[],
+                           PetscInt n_bodies, const PetscReal volume[], const PetscReal body[], const PetscReal w[],
+                           PetscReal error[2])
 {
   PetscReal lost = 0, size = 0;
 
@@ -163,11 +164,12 @@ static PetscErrorCode FindWeights(HycoReducer t, PetscReal fixed, PetscReal tol,
   PetscCall(HycoNNLSMonitored(m, n_cells, A, b, ShowCells, t, w, NULL));
   PetscCall(PetscFree2(A, b));
   for (PetscInt e = 0; e < n_cells; e++) w[e] = near[e] > 0 ? fixed : w[e];
-  Measure(n_cells, n, vectors, sigma, n_bodies, volume, body, w, error);
+  WeightsMeasure(n_cells, n, vectors, sigma, n_bodies, volume, body, w, error);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Weights by nonnegative least squares (Lawson and Hanson 1974): few positive ones, and a tangent that stays definite (ECSW; Farhat et al. 2014). */
+/* Weights by nonnegative least squares (Lawson and Hanson 1974): few positive ones, and a tangent that stays definite
+   (ECSW; Farhat et al. 2014). */
 PetscErrorCode HycoCubatureFind(HycoReducer t, const PetscBool near[], PetscReal fixed, PetscReal tol, Mat W,
                                 PetscInt n, const PetscReal sigma[], PetscReal w[], PetscReal error[2])
 {
@@ -178,7 +180,7 @@ PetscErrorCode HycoCubatureFind(HycoReducer t, const PetscBool near[], PetscReal
 
   PetscFunctionBegin;
   PetscCall(MatGetLocalSize(W, &rows, NULL));
-  PetscCall(Notes(t, near, rows, &X));
+  PetscCall(WeightsData(t, near, rows, &X));
   PetscCall(PetscMalloc2((size_t)n * n_cells + 1, &vectors, N_NOTES * n_cells + 1, &notes));
   /* All cells of n vectors on rank 0: nonnegative least squares is a serial algorithm. */
   for (PetscInt j = 0; j < n; j++) PetscCall(GatherColumn(W, j, vectors + (size_t)j * n_cells));

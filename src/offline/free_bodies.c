@@ -53,7 +53,7 @@ static PetscErrorCode PartsOfBodies(HycoReducer t, const HycoMotions *motions, P
 
 /* Orthonormal coefficients Q (n x 6) of the span of these motions. Modified Gram-Schmidt; twice, as once loses
    orthogonality for nearly parallel motions. */
-static void Span(PetscInt n, const HycoRigid rigid[], PetscReal Q[][6])
+static void FreeBodiesSpan(PetscInt n, const HycoRigid rigid[], PetscReal Q[][6])
 {
   for (PetscInt k = 0; k < n; k++) {
     PetscReal size = 0;
@@ -71,7 +71,7 @@ static void Span(PetscInt n, const HycoRigid rigid[], PetscReal Q[][6])
 }
 
 /* Whether the span of Q contains v. */
-static PetscBool Contains(PetscInt n, PetscReal Q[][6], const PetscReal v[6])
+static PetscBool FreeBodiesContains(PetscInt n, PetscReal Q[][6], const PetscReal v[6])
 {
   PetscReal in = 0, all = 0;
 
@@ -88,7 +88,7 @@ static PetscBool Contains(PetscInt n, PetscReal Q[][6], const PetscReal v[6])
 
 /* Whether these motions of a part are free at all positions of its nodes. Where a map moves the nodes, a turn stays
    one that the supports allow only if its centre is arbitrary: all translations perpendicular to its axis are free. */
-static PetscBool StayFree(HycoScene scene, PetscInt dim, PetscInt n, const HycoRigid rigid[])
+static PetscBool LeastSlipFree(HycoScene scene, PetscInt dim, PetscInt n, const HycoRigid rigid[])
 {
   PetscBool changed[HYCO_MAX_PARAMETERS], stay = PETSC_TRUE;
   PetscReal Q[6][6];
@@ -96,7 +96,7 @@ static PetscBool StayFree(HycoScene scene, PetscInt dim, PetscInt n, const HycoR
   for (PetscInt p = 0; p < HYCO_MAX_PARAMETERS; p++) changed[p] = PETSC_TRUE;
   /* In 1D there is no turn. */
   if (dim == 1 || !HycoSceneChanges(scene, changed).nodes) return PETSC_TRUE;
-  Span(n, rigid, Q);
+  FreeBodiesSpan(n, rigid, Q);
   for (PetscInt k = 0; k < n; k++) {
     const PetscReal *w = rigid[k].rigid + dim;
     const PetscReal axis[3] = {dim == 3 ? w[0] : 0, dim == 3 ? w[1] : 0, dim == 3 ? w[2] : w[0]};
@@ -107,7 +107,7 @@ static PetscBool StayFree(HycoScene scene, PetscInt dim, PetscInt n, const HycoR
 
       /* The projection of direction d to the plane perpendicular to the axis. */
       for (PetscInt c = 0; c < dim; c++) v[c] = (c == d) - axis[c] * axis[d] / turn;
-      stay = (PetscBool)(stay && Contains(n, Q, v));
+      stay = (PetscBool)(stay && FreeBodiesContains(n, Q, v));
     }
   }
   return stay;
@@ -130,7 +130,7 @@ static void KeepMotions(HycoReducer t, HycoMotions *motions, const PetscInt firs
     for (PetscInt b = 0; b < n_bodies; b++)
       whole = (PetscBool)(whole && (first[b] == last[b] || first[b] > part || last[b] < part));
     if (!whole) continue;
-    *moves = (PetscBool)(*moves || !StayFree(t->scene, t->sizes[3], n, motions->rigid + k));
+    *moves = (PetscBool)(*moves || !LeastSlipFree(t->scene, t->sizes[3], n, motions->rigid + k));
     /* In place: kept never overtakes k. */
     for (PetscInt j = 0; j < n; j++, kept++) {
       motions->rigid[kept] = motions->rigid[k + j];
@@ -140,8 +140,8 @@ static void KeepMotions(HycoReducer t, HycoMotions *motions, const PetscInt firs
   motions->n = kept;
 }
 
-/* Marks the cells of these bodies around supports and springs, and one more of each body: from them predictions find the
-   motions again, where the nodes are then. */
+/* Marks the cells of these bodies around supports and springs, and one more of each body: from them predictions find
+   the motions again, where the nodes are then. */
 static PetscErrorCode MarkSupports(HycoReducer t, const PetscBool moved[], PetscBool needed[])
 {
   const HycoScene s = t->scene;
@@ -171,7 +171,7 @@ static PetscErrorCode MarkSupports(HycoReducer t, const PetscBool moved[], Petsc
 }
 
 /* With the motions found. needed[] is filled on each rank for its own cells; the mesh of them is on rank 0 only. */
-static PetscErrorCode Take(HycoReducer t, HycoMotions *motions, HycoROM m)
+static PetscErrorCode FreeBodiesCells(HycoReducer t, HycoMotions *motions, HycoROM m)
 {
   HycoMesh part = t->fom->part, loaded = NULL;
   const PetscInt n = t->scene->n_bodies;
@@ -208,7 +208,7 @@ PetscErrorCode HycoReducerFindFloating(HycoReducer t, HycoROM m)
 
   PetscFunctionBegin;
   PetscCall(HycoFEFreeMotions(HycoComm(t), t->fom->fe, &motions));
-  if (motions.n) ierr = Take(t, &motions, m);
+  if (motions.n) ierr = FreeBodiesCells(t, &motions, m);
   PetscCall(HycoMotionsDestroy(&motions));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -40,7 +40,7 @@ static PetscErrorCode AddCorners(HycoReducer t, HycoSamples samples)
 
 /* Creates the loop's own set of samples, which will grow: each point once. Its own copy, because the loop adds
    points; (42) needs distinct points. */
-static PetscErrorCode Start(HycoReducer t, HycoSamples start, HycoSamples *samples)
+static PetscErrorCode GreedyStart(HycoReducer t, HycoSamples start, HycoSamples *samples)
 {
   PetscInt n, n_par;
   const PetscReal *mu;
@@ -132,7 +132,7 @@ static PetscErrorCode SpreadSnapshots(HycoReducer t, HycoROM m, PetscReal **U_at
 }
 
 /* PETSc's infinity is a large finite number; the table and comparisons need IEEE infinity. */
-static PetscReal Infinite(PetscReal value)
+static PetscReal GreedyInfinite(PetscReal value)
 {
   return value >= PETSC_INFINITY ? INFINITY : value;
 }
@@ -154,17 +154,17 @@ static PetscErrorCode EvaluateShare(HycoReducer t, Loop *loop, HycoROM m, const 
 
     PetscCall(HycoIndicatorEvaluate(indicator, loop->points + k * loop->n_par, &v));
     /* Reduced by a maximum over ranks later: a NaN would be lost there. */
-    loop->value[4 * k] = Infinite(v.eta);
-    loop->value[4 * k + 1] = Infinite(v.eta_u);
-    loop->value[4 * k + 2] = Infinite(v.eta_lambda);
-    loop->value[4 * k + 3] = Infinite(v.size);
+    loop->value[4 * k] = GreedyInfinite(v.eta);
+    loop->value[4 * k + 1] = GreedyInfinite(v.eta_u);
+    loop->value[4 * k + 2] = GreedyInfinite(v.eta_lambda);
+    loop->value[4 * k + 3] = GreedyInfinite(v.size);
   }
   PetscCall(HycoIndicatorDestroy(&indicator));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Evaluates the indicator at every training point, for every rank. */
-static PetscErrorCode Evaluate(HycoReducer t, Loop *loop)
+static PetscErrorCode GreedyEvaluate(HycoReducer t, Loop *loop)
 {
   HycoROM m = loop->model;
   PetscReal *U_at = NULL;
@@ -193,15 +193,15 @@ static PetscErrorCode EvaluateModel(HycoReducer t, Loop *loop, PetscInt iteratio
   PetscCall(PetscSNPrintf(path, sizeof(path), "%s/greedy-%03d.h5", loop->store->folder, (int)iteration));
   if (t->greedy.keep || whole) PetscCall(HycoROMSave(loop->model, t->fom, t->l, t->V, path));
   if (whole) PetscCall(PetscStrncpy(loop->model->model->path, path, sizeof(loop->model->model->path)));
-  ierr = Evaluate(t, loop);
-  /* With an error too: it was written to be read by Evaluate() alone. */
+  ierr = GreedyEvaluate(t, loop);
+  /* With an error too: it was written to be read by GreedyEvaluate() alone. */
   if (whole && !t->greedy.keep && t->rank == 0) remove(path);
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Of infinite values, the one with the larger numerator is worse; equal values are not. */
-static PetscBool Worse(const PetscReal a[], const PetscReal b[])
+static PetscBool GreedyWorse(const PetscReal a[], const PetscReal b[])
 {
   const PetscInt by = PetscIsInfReal(a[0]) && PetscIsInfReal(b[0]) ? 3 : 0;
 
@@ -210,7 +210,7 @@ static PetscBool Worse(const PetscReal a[], const PetscReal b[])
 
 /* Distance from training point k to the nearest solution. Scaled to the ranges; only orders points, so that an
    error of HycoSamplesGet(), which has none here, gives 0. */
-static PetscReal Distance(HycoReducer t, const Loop *loop, PetscInt k)
+static PetscReal GreedyDistance(HycoReducer t, const Loop *loop, PetscInt k)
 {
   const PetscReal *solved;
   PetscReal least = PETSC_MAX_REAL;
@@ -224,16 +224,16 @@ static PetscReal Distance(HycoReducer t, const Loop *loop, PetscInt k)
 
 /* Whether training point a is solved before b: it is worse, or neither has a prediction and a is farther from the
    nearest solution. */
-static PetscBool Before(HycoReducer t, const Loop *loop, PetscInt a, PetscInt b)
+static PetscBool GreedyPrecedes(HycoReducer t, const Loop *loop, PetscInt a, PetscInt b)
 {
   const PetscReal *of_a = loop->value + 4 * a, *of_b = loop->value + 4 * b;
 
-  if (!PetscIsInfReal(of_a[3]) || !PetscIsInfReal(of_b[3])) return Worse(of_a, of_b);
-  return (PetscBool)(Distance(t, loop, a) > Distance(t, loop, b) * (1 + TIE));
+  if (!PetscIsInfReal(of_a[3]) || !PetscIsInfReal(of_b[3])) return GreedyWorse(of_a, of_b);
+  return (PetscBool)(GreedyDistance(t, loop, a) > GreedyDistance(t, loop, b) * (1 + TIE));
 }
 
 /* The worst point that is not solved yet (-1: none is left), and the data for the monitor. */
-static PetscErrorCode Choose(HycoReducer t, Loop *loop, PetscInt *worst, HycoGreedyStep *step)
+static PetscErrorCode GreedyChoose(HycoReducer t, Loop *loop, PetscInt *worst, HycoGreedyStep *step)
 {
   const PetscReal *solved;
   PetscInt n_solved, n_finite = 0;
@@ -255,7 +255,7 @@ static PetscErrorCode Choose(HycoReducer t, Loop *loop, PetscInt *worst, HycoGre
     for (PetscInt j = 0; j < n_solved && !known; j++)
       PetscCall(PetscArraycmp(solved + j * loop->n_par, loop->points + k * loop->n_par, loop->n_par, &known));
     /* A solved point may still have the largest indicator, as of a poor model: solving it again would never end. */
-    if (!known && (*worst < 0 || Before(t, loop, k, *worst))) *worst = k;
+    if (!known && (*worst < 0 || GreedyPrecedes(t, loop, k, *worst))) *worst = k;
   }
   step->n_points = loop->n_points;
   step->n_infinite = loop->n_points - n_finite;
@@ -278,9 +278,10 @@ static const char *WhyStop(HycoReducer t, const HycoGreedyStep *step)
   return step->worst ? NULL : "points";
 }
 
-/* One iteration of section 5.4: a model of the points so far, its indicator at all training points, the worst of which is
-   added. The decision to stop uses rank 0's clock, so that it is the same on every rank. */
-static PetscErrorCode Iterate(HycoReducer t, Loop *loop, PetscInt iteration, HycoTraining *report, PetscBool *last)
+/* One iteration of section 5.4: a model of the points so far, its indicator at all training points, the worst of which
+   is added. The decision to stop uses rank 0's clock, so that it is the same on every rank. */
+static PetscErrorCode GreedyIterate(HycoReducer t, Loop *loop, PetscInt iteration, HycoTraining *report,
+                                    PetscBool *last)
 {
   HycoGreedyStep step = {0};
   PetscInt worst;
@@ -290,7 +291,7 @@ static PetscErrorCode Iterate(HycoReducer t, Loop *loop, PetscInt iteration, Hyc
   PetscCall(HycoROMDestroy(&loop->model));
   PetscCall(BuildModel(t, loop, iteration, report));
   PetscCall(EvaluateModel(t, loop, iteration));
-  PetscCall(Choose(t, loop, &worst, &step));
+  PetscCall(GreedyChoose(t, loop, &worst, &step));
   step.iteration = iteration;
   PetscCall(HycoSamplesGet(loop->samples, &step.n_samples, NULL, NULL));
   step.n_modes = report->n_modes;
@@ -331,7 +332,7 @@ static PetscErrorCode SetSettings(HycoReducer t)
 
 /* Builds the model from the chosen solutions, and judges it by held-out ones. The held-out points are drawn now,
    apart from the solutions that the loop has chosen. */
-static PetscErrorCode Conclude(HycoReducer t, Loop *loop, const char path[], HycoTraining *report)
+static PetscErrorCode GreedyConclude(HycoReducer t, Loop *loop, const char path[], HycoTraining *report)
 {
   const PetscBool learn = (PetscBool)(t->search && t->n_validation && t->scene->n_parameters);
 
@@ -353,7 +354,7 @@ static PetscErrorCode RunLoop(HycoReducer t, Loop *loop, HycoTraining *report)
   PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBegin;
-  for (PetscInt iteration = 0; !last && !ierr; iteration++) ierr = Iterate(t, loop, iteration, report, &last);
+  for (PetscInt iteration = 0; !last && !ierr; iteration++) ierr = GreedyIterate(t, loop, iteration, report, &last);
   PetscCall(HycoROMDestroy(&loop->model));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -366,7 +367,7 @@ static PetscErrorCode RunOn(HycoReducer t, Loop *loop, const char path[], HycoTr
   PetscCall(SetSettings(t));
   PetscCall(PetscCalloc1(t->fom->part->n_cells, &t->grown));
   PetscCall(RunLoop(t, loop, report));
-  PetscCall(Conclude(t, loop, path, report));
+  PetscCall(GreedyConclude(t, loop, path, report));
   report->seconds_reduction = HycoNow() - loop->begin;
   PetscCall(HycoReducerReset(t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -394,7 +395,7 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
       "the greedy training has %d candidate point, and at least two are needed; give -training_grid 20,24, for example",
       (int)loop.n_points);
   PetscCall(PetscMalloc1(4 * loop.n_points, &loop.value));
-  PetscCall(Start(t, start, &loop.samples));
+  PetscCall(GreedyStart(t, start, &loop.samples));
   PetscCall(CheckStart(t, (PetscBool)!start, loop.samples));
   PetscCall(HycoReducerOpen(t, loop.samples, path, &loop.store));
   HycoFinally(RunOn(t, &loop, path, &report), PetscCall(HycoReducerClose(t, &loop.store)); report.sliding = t->sliding;

@@ -137,7 +137,7 @@ static PetscErrorCode AssembleNorm(HycoIndicator d)
 }
 
 /* (42) on the interface, zero elsewhere. */
-static PetscErrorCode Interpolate(HycoIndicator d, const PetscReal mu[])
+static PetscErrorCode IndicatorInterpolate(HycoIndicator d, const PetscReal mu[])
 {
   const PetscInt *dof;
   PetscScalar *u;
@@ -221,7 +221,7 @@ static PetscErrorCode NormOfForce(HycoIndicator d, Vec L, PetscReal *norm)
 }
 
 /* (43), with the local solution in x and L, which are overwritten. */
-static PetscErrorCode Distances(HycoIndicator d, HycoIndication *v)
+static PetscErrorCode IndicatorDistances(HycoIndicator d, HycoIndication *v)
 {
   HycoROM m = d->model;
   PetscReal size, lost;
@@ -256,7 +256,7 @@ static PetscErrorCode Distances(HycoIndicator d, HycoIndication *v)
 }
 
 /* (45) */
-static PetscReal Penetration(HycoROM m)
+static PetscReal IndicatorPenetration(HycoROM m)
 {
   PetscReal sum = 0;
 
@@ -282,10 +282,10 @@ static PetscErrorCode EvaluateLocal(HycoIndicator d, const PetscReal mu[], HycoR
   PetscUseTypeMethod(m, local, &d->local);
   if (!d->system) PetscCall(SetUp(d));
   PetscCall(AssembleNorm(d));
-  PetscCall(Interpolate(d, mu));
+  PetscCall(IndicatorInterpolate(d, mu));
   PetscCall(SolveLocal(d, reason));
   /* Also if the local problem was not solved; the caller then replaces the values. */
-  PetscCall(Distances(d, v));
+  PetscCall(IndicatorDistances(d, v));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -314,7 +314,7 @@ PetscErrorCode HycoIndicatorEvaluate(HycoIndicator d, const PetscReal mu[], Hyco
   if (d->kind == HYCO_INDICATOR_PENETRATION) {
     /* Penetration counts at all contacts, also outside the RID. */
     PetscCall(HycoROMComplete(m));
-    v->eta = v->eta_u = v->size = Penetration(m);
+    v->eta = v->eta_u = v->size = IndicatorPenetration(m);
     v->eta_lambda = 0;
   } else if (d->kind == HYCO_INDICATOR_LOCAL)
     PetscCall(EvaluateLocal(d, mu, &reason, v));

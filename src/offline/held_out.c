@@ -20,7 +20,7 @@ static const char *const fields[HYCO_COMPARED] = {"U", "sigma", "inelastic"};
 
 /* Reads a solution; step: the listed time, with a history. Each rank its rows of the fields; all ranks have the
    file open. */
-static PetscErrorCode Read(Rows *r, const PetscReal mu[], PetscInt step)
+static PetscErrorCode HeldOutRead(Rows *r, const PetscReal mu[], PetscInt step)
 {
   HycoComparison *c = &r->c;
 
@@ -69,7 +69,7 @@ static PetscErrorCode MeasureU(Rows *r, const PetscReal mu[], PetscInt step, Pet
 
   PetscFunctionBegin;
   /* Each rank reads its rows of the stored solution. */
-  HycoOnEach(HycoComm(t), Read(r, mu, step));
+  HycoOnEach(HycoComm(t), HeldOutRead(r, mu, step));
   PetscCall(HycoComparisonBring(&r->c));
   HycoSceneSetTime(t->scene, mu, t->scene->n_times ? t->scene->times[step] : 0, all);
   PetscCall(HycoFOMSetParameters(t->fom, all));
@@ -84,7 +84,7 @@ static PetscErrorCode MeasureU(Rows *r, const PetscReal mu[], PetscInt step, Pet
 
 /* The comparison at listed time `step`, which the model has selected, on the predicting process. */
 static PetscErrorCode MeasureStep(Rows *r, const PetscReal mu[], PetscInt step, const PetscReal square[2],
-                                  HycoLost lost[])
+                                  HycoErrorNorm lost[])
 {
   PetscReal *lambda;
 
@@ -93,8 +93,8 @@ static PetscErrorCode MeasureStep(Rows *r, const PetscReal mu[], PetscInt step, 
   PetscCall(HycoSnapshotsReadRows(r->store, mu, step, "lambda", 0, r->m->model->pairs.n, lambda));
   PetscCall(HycoROMMeasureRID(r->m, r->c.rid[0], r->c.rid[1], r->c.rid[2], lambda, lost));
   /* Squares of the whole mesh, which all ranks have summed. */
-  lost[HYCO_ERROR_U] = (HycoLost){PetscSqrtReal(square[0]), PetscSqrtReal(square[1])};
-  HycoTraceForgive(r->m, step, lost);
+  lost[HYCO_ERROR_U] = (HycoErrorNorm){PetscSqrtReal(square[0]), PetscSqrtReal(square[1])};
+  HycoTraceExcludeDisplacements(r->m, step, lost);
   /* Forces that are not unique differ without an error. */
   if (r->m->trace.history.step[step].n_dependent > 0)
     lost[HYCO_ERROR_LAMBDA].lost = lost[HYCO_ERROR_LAMBDA_RID].lost = 0;
@@ -103,7 +103,7 @@ static PetscErrorCode MeasureStep(Rows *r, const PetscReal mu[], PetscInt step, 
 }
 
 /* Sets the errors of a path; those of forces before the division that depends on all held-out paths. */
-static PetscErrorCode ConcludePath(HycoROM m, PetscInt n, const HycoLost lost[], HycoHeldOut *row)
+static PetscErrorCode ConcludePath(HycoROM m, PetscInt n, const HycoErrorNorm lost[], HycoHeldOut *row)
 {
   HycoPathErrors e;
 
@@ -130,7 +130,7 @@ static PetscErrorCode ComparePath(Rows *r, const PetscReal mu[], PetscMPIInt of,
 {
   const PetscBool mine = (PetscBool)(r->t->rank == of);
   PetscInt n = r->m->trace.n_listed;
-  HycoLost *lost;
+  HycoErrorNorm *lost;
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, of, HycoComm(r->t)));
@@ -152,7 +152,7 @@ static PetscErrorCode ComparePath(Rows *r, const PetscReal mu[], PetscMPIInt of,
 }
 
 /* Compares the last prediction of rank `of`, at mu; the row belongs to that rank. Collective. */
-static PetscErrorCode Compare(Rows *r, const PetscReal mu[], PetscMPIInt of, HycoHeldOut *row)
+static PetscErrorCode HeldOutCompare(Rows *r, const PetscReal mu[], PetscMPIInt of, HycoHeldOut *row)
 {
   PetscReal square[2];
 
@@ -189,7 +189,8 @@ PetscErrorCode HycoHeldOutPredict(HycoROM m, HycoSnapshots store, const PetscRea
 }
 
 /* A repetition measures time alone; the median counts, because the machine may be busy at one of them. */
-static PetscErrorCode Predict(HycoROM m, HycoSnapshots store, const PetscReal mu[], PetscInt repeat, HycoHeldOut *row)
+static PetscErrorCode HeldOutPredict(HycoROM m, HycoSnapshots store, const PetscReal mu[], PetscInt repeat,
+                                     HycoHeldOut *row)
 {
   PetscFunctionBegin;
   PetscCall(HycoHeldOutPredict(m, store, mu));
@@ -208,7 +209,7 @@ static PetscErrorCode PredictAgain(HycoROM m, HycoSnapshots store, PetscInt firs
   PetscFunctionBegin;
   for (PetscInt r = 1; r < HYCO_HELD_REPEATS; r++) {
     for (PetscInt k = first; k < last; k++)
-      PetscCall(Predict(m, store, mu + k * m->model->scene->n_parameters, r, &rows[k]));
+      PetscCall(HeldOutPredict(m, store, mu + k * m->model->scene->n_parameters, r, &rows[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -244,12 +245,12 @@ static PetscErrorCode PredictPoints(Rows *r, HycoHeldOut rows[])
   for (PetscInt step = 0; step * size < n + size; step++) {
     const PetscInt k = first + step;
 
-    HycoOnEach(HycoComm(t), k < last ? Predict(r->m, r->store, mu + k * n_par, 0, &rows[k]) : PETSC_SUCCESS);
+    HycoOnEach(HycoComm(t), k < last ? HeldOutPredict(r->m, r->store, mu + k * n_par, 0, &rows[k]) : PETSC_SUCCESS);
     for (PetscMPIInt of = 0; of < size; of++) {
       /* Every rank compares every point: its rows of the whole mesh. */
       const PetscInt j = of * n / size + step;
 
-      if (j < (of + 1) * n / size) PetscCall(Compare(r, mu + j * n_par, of, &rows[j]));
+      if (j < (of + 1) * n / size) PetscCall(HeldOutCompare(r, mu + j * n_par, of, &rows[j]));
     }
   }
   HycoOnEach(HycoComm(t), PredictAgain(r->m, r->store, first, last, mu, rows));
@@ -260,7 +261,7 @@ static PetscErrorCode PredictPoints(Rows *r, HycoHeldOut rows[])
 }
 
 /* Whether it ends the race. */
-static PetscBool Loses(const HycoHeldOutRace *race, const HycoHeldOut *row)
+static PetscBool HeldOutHasLost(const HycoHeldOutEarlyStop *race, const HycoHeldOut *row)
 {
   if (race->all) return PETSC_FALSE;
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
@@ -273,7 +274,7 @@ static PetscBool Loses(const HycoHeldOutRace *race, const HycoHeldOut *row)
 
 /* Held-out paths in the order of the race, one for each rank at a time. Those after the one that ends it are
    ignored, so that the result does not depend on the number of ranks. */
-static PetscErrorCode PredictPaths(Rows *r, HycoHeldOutRace *race, HycoHeldOut rows[])
+static PetscErrorCode PredictPaths(Rows *r, HycoHeldOutEarlyStop *race, HycoHeldOut rows[])
 {
   HycoReducer t = r->t;
   PetscInt n, n_par;
@@ -287,7 +288,8 @@ static PetscErrorCode PredictPaths(Rows *r, HycoHeldOutRace *race, HycoHeldOut r
 
     HycoOnRoot(HycoComm(t), HycoReducerTell(t, "held-out paths", race->n, n));
     /* As many paths at once as ranks; those after a lost one were predicted in vain. */
-    HycoOnEach(HycoComm(t), mine < 0 ? PETSC_SUCCESS : Predict(r->m, r->store, mu + mine * n_par, 0, &rows[mine]));
+    HycoOnEach(HycoComm(t),
+               mine < 0 ? PETSC_SUCCESS : HeldOutPredict(r->m, r->store, mu + mine * n_par, 0, &rows[mine]));
     for (PetscMPIInt of = 0; of < here; of++) {
       HycoHeldOut *row = &rows[point[of]];
 
@@ -298,7 +300,7 @@ static PetscErrorCode PredictPaths(Rows *r, HycoHeldOutRace *race, HycoHeldOut r
       PetscCall(ComparePath(r, mu + point[of] * n_par, of, row));
       PetscCallMPI(MPI_Bcast(row, (PetscMPIInt)(sizeof(*row) / sizeof(PetscReal)), MPIU_REAL, of, HycoComm(t)));
       race->n++;
-      race->lost = Loses(race, row);
+      race->lost = HeldOutHasLost(race, row);
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -307,7 +309,7 @@ static PetscErrorCode PredictPaths(Rows *r, HycoHeldOutRace *race, HycoHeldOut r
 /* All of them, in their order. A race without an end, in the order of the points. */
 static PetscErrorCode PredictAllPaths(Rows *r, PetscInt n, HycoHeldOut rows[])
 {
-  HycoHeldOutRace race = {.all = PETSC_TRUE};
+  HycoHeldOutEarlyStop race = {.all = PETSC_TRUE};
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n, &race.order));
@@ -318,7 +320,7 @@ static PetscErrorCode PredictAllPaths(Rows *r, PetscInt n, HycoHeldOut rows[])
 
 /* rows[] has a place for every point; collective, as fields are compared by the ranks that have them. */
 PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoSamples points, HycoROM m, HycoSnapshots store,
-                                         HycoHeldOutRace *race, HycoHeldOut rows[])
+                                         HycoHeldOutEarlyStop *race, HycoHeldOut rows[])
 {
   Rows r = {t, points, m, store, {0}};
   PetscInt n;
@@ -348,7 +350,7 @@ PetscReal HycoHeldOutForce(PetscInt n, const HycoHeldOut rows[])
 
 /* One of row->error or row->end, after division. Forces are divided by the larger of their own size and a share of the
    largest of all points: where a contact just closes any error would be infinite. */
-static PetscReal Divided(const HycoHeldOut *row, HycoErrorKind kind, PetscReal force, PetscReal error)
+static PetscReal HeldOutDivided(const HycoHeldOut *row, HycoErrorKind kind, PetscReal force, PetscReal error)
 {
   const PetscBool forces = (PetscBool)(kind == HYCO_ERROR_LAMBDA || kind == HYCO_ERROR_LAMBDA_RID);
   const PetscReal size = kind == HYCO_ERROR_LAMBDA ? row->size : row->rid_size,
@@ -363,11 +365,11 @@ static PetscReal Divided(const HycoHeldOut *row, HycoErrorKind kind, PetscReal f
 
 PetscReal HycoHeldOutError(const HycoHeldOut *row, HycoErrorKind kind, PetscReal force)
 {
-  return Divided(row, kind, force, row->error[kind]);
+  return HeldOutDivided(row, kind, force, row->error[kind]);
 }
 
-/* Infinite errors make the mean infinite, the median of the others stays. Points that were not compared (NaN) do not enter;
-   where none was, nor do they have a value. */
+/* Infinite errors make the mean infinite, the median of the others stays. Points that were not compared (NaN) do not
+   enter; where none was, nor do they have a value. */
 PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], PetscReal force, HycoValidation *v)
 {
   PetscReal *error;
@@ -392,7 +394,7 @@ PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], PetscR
     for (PetscInt k = 0; k < n; k++) {
       error[m] = HycoHeldOutError(&rows[k], (HycoErrorKind)j, force);
       if (PetscIsNanReal(error[m])) continue;
-      v->end[j] = PetscMax(v->end[j], Divided(&rows[k], (HycoErrorKind)j, force, rows[k].end[j]));
+      v->end[j] = PetscMax(v->end[j], HeldOutDivided(&rows[k], (HycoErrorKind)j, force, rows[k].end[j]));
       if (error[m] > v->largest[j]) {
         v->largest[j] = error[m];
         v->worst[j] = k;

@@ -120,11 +120,11 @@ static PetscErrorCode JudgeAll(HycoReducer t, HycoROM m, PetscReal most, HycoJud
 /* Smallest number of paths after which a race is decided. */
 #define RACED 3
 
-/* Predicts the training paths one by one, and stops when this model has lost: its sum of errors reaches that of the best
-   settings over all paths, or, from RACED paths on, theirs over the same paths. A mean over all paths is compared,
+/* Predicts the training paths one by one, and stops when this model has lost: its sum of errors reaches that of the
+   best settings over all paths, or, from RACED paths on, theirs over the same paths. A mean over all paths is compared,
    so that the sum may stop as soon as it is reached: errors are not negative. */
-static PetscErrorCode Race(HycoReducer t, HycoROM m, PetscInt n, const PetscInt order[], const HycoJudged best[],
-                           PetscReal most, HycoJudged judged[], PetscBool *lost)
+static PetscErrorCode JudgeUntilLost(HycoReducer t, HycoROM m, PetscInt n, const PetscInt order[],
+                                     const HycoJudged best[], PetscReal most, HycoJudged judged[], PetscBool *lost)
 {
   PetscInt n_par;
   const PetscReal *mu;
@@ -148,8 +148,8 @@ static PetscErrorCode Race(HycoReducer t, HycoROM m, PetscInt n, const PetscInt 
 }
 
 /* m->reconstruct is off: forces outside the RID are not judged, and cost more than the solve. */
-PetscErrorCode HycoReducerJudgeRace(HycoReducer t, HycoROM m, const HycoJudged best[], PetscReal most,
-                                    HycoJudged judged[], PetscReal *u, PetscBool *lost)
+PetscErrorCode HycoReducerJudgeEarlyStop(HycoReducer t, HycoROM m, const HycoJudged best[], PetscReal most,
+                                         HycoJudged judged[], PetscReal *u, PetscBool *lost)
 {
   PetscInt n, *order;
   PetscReal *key;
@@ -164,7 +164,7 @@ PetscErrorCode HycoReducerJudgeRace(HycoReducer t, HycoROM m, const HycoJudged b
   }
   if (best) PetscCall(PetscSortRealWithArrayInt(n, key, order));
   m->reconstruct = PETSC_FALSE;
-  PetscCall(Race(t, m, n, order, best, most, judged, lost));
+  PetscCall(JudgeUntilLost(t, m, n, order, best, most, judged, lost));
   PetscCall(HycoROMSetSteps(m, 0, NULL));
   m->reconstruct = PETSC_TRUE;
   PetscCall(PetscFree2(order, key));

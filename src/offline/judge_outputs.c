@@ -1,7 +1,8 @@
 /*
   Errors of the scene's outputs at held-out points: those of the final model compared with those of the stored
   full-order solutions, in the outputs' own units. Rank 0 evaluates both on the cells that the outputs need, by the
-  functions of predict (output_cells.c). Outputs may pass through zero, so that no error is divided by the output itself.
+  functions of predict (output_cells.c). Outputs may pass through zero, so that no error is divided by the output
+  itself.
 */
 #include <hycoquantities.h>
 #include <hycoreducerimpl.h>
@@ -79,13 +80,13 @@ static PetscErrorCode MakeProbe(HycoReducer t, HycoROM m)
 }
 
 /* The number of values of a node or cell. */
-static PetscInt Width(const Outputs *o, int k)
+static PetscInt JudgedOutputsWidth(const Outputs *o, int k)
 {
   return k == STRESS ? o->fe->n_sigma : o->fe->dim;
 }
 
 /* The number of the mesh's nodes or cells, and their numbers in the whole mesh. */
-static PetscInt Places(const Outputs *o, int k, const PetscInt **at)
+static PetscInt JudgedOutputsPositions(const Outputs *o, int k, const PetscInt **at)
 {
   *at = k == STRESS ? o->fe->mesh->cell_whole : o->fe->mesh->node_whole;
   return k == STRESS ? o->fe->mesh->n_cells : o->fe->mesh->n_nodes;
@@ -93,14 +94,14 @@ static PetscInt Places(const Outputs *o, int k, const PetscInt **at)
 
 /* The ranges of rows of each field that the outputs' cells need: only these are read from the snapshots. Rows from
    the first to the last that is needed, one read for each field: outputs are often at one place of the mesh. */
-static PetscErrorCode Begin(Outputs *o)
+static PetscErrorCode JudgedOutputsBegin(Outputs *o)
 {
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(o->m->model->pairs.n, &o->lambda));
   PetscCall(PetscCalloc2(3 * o->m->model->pairs.n, &o->shear.force, o->m->model->pairs.n, &o->shear.work));
   o->fe = HycoROMGetOutputCells(o->m);
   for (int k = 0; o->fe && k < N_FIELDS; k++) {
-    const PetscInt *at, n = Places(o, k, &at);
+    const PetscInt *at, n = JudgedOutputsPositions(o, k, &at);
     PetscInt last = -1;
 
     /* An empty range if no cell is needed. */
@@ -110,13 +111,14 @@ static PetscErrorCode Begin(Outputs *o)
       last = PetscMax(last, at[i]);
     }
     o->n[k] = PetscMax(0, last + 1 - o->first[k]);
-    PetscCall(PetscMalloc2(o->n[k] * Width(o, k), &o->rows[k], n * Width(o, k), &o->value[k]));
+    PetscCall(
+        PetscMalloc2(o->n[k] * JudgedOutputsWidth(o, k), &o->rows[k], n * JudgedOutputsWidth(o, k), &o->value[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* After an error too. The friction of the last shown time returns to the contacts, which borrowed o->shear. */
-static PetscErrorCode End(Outputs *o)
+static PetscErrorCode JudgedOutputsEnd(Outputs *o)
 {
   PetscFunctionBegin;
   HycoTraceShow(o->m, o->m->trace.shown);
@@ -129,7 +131,7 @@ static PetscErrorCode End(Outputs *o)
 /* Reads a field of the solution at mu; *has: the solution has it. */
 static PetscErrorCode ReadField(Outputs *o, const PetscReal mu[], PetscInt step, int k, PetscBool *has)
 {
-  const PetscInt *at, n = Places(o, k, &at), width = Width(o, k);
+  const PetscInt *at, n = JudgedOutputsPositions(o, k, &at), width = JudgedOutputsWidth(o, k);
 
   PetscFunctionBegin;
   *has = PETSC_TRUE;
@@ -253,9 +255,9 @@ static PetscErrorCode JudgeOnRoot(Outputs *o, HycoHeldOut rows[], HycoOutputErro
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  ierr = Begin(o);
+  ierr = JudgedOutputsBegin(o);
   if (!ierr) ierr = JudgeAll(o, rows, e);
-  PetscCall(End(o));
+  PetscCall(JudgedOutputsEnd(o));
   PetscCall(HycoOutputCellsDestroy(&o->m->output_cells));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

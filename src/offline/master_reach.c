@@ -96,7 +96,7 @@ static PetscErrorCode SurfacesCreate(HycoScene scene, HycoMesh whole, const Hyco
 }
 
 /* The distance from slave k to its master point. */
-static PetscReal Way(const Surfaces *s, PetscInt k)
+static PetscReal MasterReachDistance(const Surfaces *s, PetscInt k)
 {
   PetscReal r[3];
 
@@ -136,7 +136,7 @@ PetscErrorCode HycoMetReach(HycoScene scene, HycoMesh whole, const HycoPairs *pa
 
       /* Only contacts that carry a force: others may be at any distance. */
       if (Lambda[(size_t)q * (size_t)pairs->n + (size_t)s.of[k]] > 0 && !HycoPairsAlone(scene, &s.pairs, k))
-        reach[c] = PetscMax(reach[c], Way(&s, k));
+        reach[c] = PetscMax(reach[c], MasterReachDistance(&s, k));
     }
   }
   for (PetscInt c = 0; c < scene->n_contacts; c++) {
@@ -165,7 +165,7 @@ typedef struct {
 
 /* Adds the contacts' current masters; *grown counts the new ones. l->head[k] begins the list of contact k, newest
    first; nodes of all lists are in one array. */
-static PetscErrorCode Note(const HycoPairs *p, Lists *l, PetscInt *grown)
+static PetscErrorCode MasterReachAddMasters(const HycoPairs *p, Lists *l, PetscInt *grown)
 {
   PetscFunctionBegin;
   for (PetscInt k = 0; k < p->n; k++) {
@@ -198,20 +198,20 @@ static PetscErrorCode Note(const HycoPairs *p, Lists *l, PetscInt *grown)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the masters at these parameters to the lists; *grown counts what is new, so that the caller can stop when nothing
-   is. */
+/* Adds the masters at these parameters to the lists; *grown counts what is new, so that the caller can stop when
+   nothing is. */
 static PetscErrorCode NoteAt(Surfaces *s, const PetscReal mu[], Lists *l, PetscInt *grown)
 {
   PetscFunctionBegin;
   *grown = 0;
   PetscCall(HycoFESetParameters(s->fe, mu));
   PetscCall(HycoPairsMove(s->fe, &s->pairs));
-  PetscCall(Note(&s->pairs, l, grown));
+  PetscCall(MasterReachAddMasters(&s->pairs, l, grown));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Whether parameter p moves a body. */
-static PetscBool Moves(HycoScene scene, PetscInt p)
+static PetscBool MasterReachIsMoving(HycoScene scene, PetscInt p)
 {
   PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, moves = PETSC_FALSE;
 
@@ -237,7 +237,7 @@ static PetscErrorCode NoteBetween(Surfaces *s, HycoScene scene, const PetscReal 
 
     for (PetscInt p = 0; p < n_par; p++) {
       at[p] = mu[p];
-      if (Moves(scene, p)) at[p] = scene->lo[p] + (scene->hi[p] - scene->lo[p]) * HycoHalton(k, moving++);
+      if (MasterReachIsMoving(scene, p)) at[p] = scene->lo[p] + (scene->hi[p] - scene->lo[p]) * HycoHalton(k, moving++);
     }
     /* No parameter moves anything: training points are all there is. */
     if (!moving) break;
@@ -248,7 +248,7 @@ static PetscErrorCode NoteBetween(Surfaces *s, HycoScene scene, const PetscReal 
 }
 
 /* Converts the lists to contacts on the whole mesh, after those on surfaces that are not moved. */
-static PetscErrorCode Collect(const Surfaces *s, const HycoPairs *pairs, const Lists *l, HycoMet *met)
+static PetscErrorCode MasterReachCollect(const Surfaces *s, const HycoPairs *pairs, const Lists *l, HycoMet *met)
 {
   HycoPairs *out = &met->rows;
   const PetscInt most = pairs->n + l->n;
@@ -305,7 +305,7 @@ PetscErrorCode HycoMetFind(HycoScene scene, HycoMesh whole, const HycoPairs *pai
   for (PetscInt k = 0; k < s.pairs.n; k++) l.head[k] = -1;
   for (PetscInt k = 0; k < n; k++) PetscCall(NoteAt(&s, mu + k * scene->n_parameters, &l, &grown));
   if (n) PetscCall(NoteBetween(&s, scene, mu, &l));
-  PetscCall(Collect(&s, pairs, &l, met));
+  PetscCall(MasterReachCollect(&s, pairs, &l, met));
   HycoFreeAll(&l.head, &l.row, &l.node);
   PetscCall(SurfacesDestroy(&s));
   PetscFunctionReturn(PETSC_SUCCESS);

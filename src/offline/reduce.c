@@ -112,7 +112,7 @@ PetscErrorCode HycoReducerReadField(HycoReducer t, HycoSnapshots store, PetscInt
 
 /* Q-DEIM chooses its points by a pivoted QR of V^T, which depends on the space of the modes and not on their
    order, with a better bound of the interpolation error than the greedy choice of DEIM (Drmac, Gugercin 2016). */
-static PetscErrorCode Points(HycoReducer t, Mat V, PetscInt index[])
+static PetscErrorCode ReducePoints(HycoReducer t, Mat V, PetscInt index[])
 {
   PetscFunctionBegin;
   PetscCall(t->deim ? HycoQDEIM(V, index) : HycoDEIM(V, index));
@@ -165,7 +165,7 @@ static PetscInt CountDominant(const HycoScene scene, PetscInt n, const PetscReal
 }
 
 /* The part of S orthogonal to the columns of V. */
-static PetscErrorCode Deflate(Mat V, Mat S, Mat *rest)
+static PetscErrorCode ReduceDeflate(Mat V, Mat S, Mat *rest)
 {
   Mat C, part;
 
@@ -201,7 +201,7 @@ static PetscErrorCode DisplacementPOD(HycoReducer t, Mat S, PetscReal tol, Petsc
   PetscCall(MatDuplicate(part, MAT_COPY_VALUES, &W));
   PetscCall(MatDenseRestoreSubMatrix(*V, &part));
   PetscCall(MatDestroy(V));
-  PetscCall(Deflate(W, S, &rest));
+  PetscCall(ReduceDeflate(W, S, &rest));
   PetscCall(PetscCalloc1(n + 1, &behind));
   PetscCall(HycoReducerPOD(t, rest, tol, PetscMax(0, max_modes - first), V, &more, behind));
   PetscCall(PetscArraycpy(sigma + first, behind, PetscMin(N, n) - first));
@@ -535,7 +535,7 @@ static PetscErrorCode ReduceField(HycoReducer t, HycoSnapshots store, PetscInt k
 }
 
 /* Whether a basis seeds the RID of the current type. */
-static PetscBool Seeds(HycoReducer t, PetscInt kind)
+static PetscBool ReduceSeeds(HycoReducer t, PetscInt kind)
 {
   return (PetscBool)(t->seed[kind] && !t->prototype->model->traits.cells);
 }
@@ -548,9 +548,9 @@ static PetscErrorCode SeedFrom(HycoReducer t, Mat V, PetscInt l, PetscInt kind, 
 
   PetscFunctionBegin;
   /* A basis may serve the modes without placing the RID. */
-  if (!l || !Seeds(t, kind)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!l || !ReduceSeeds(t, kind)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(l, &index));
-  HycoLogged(HYCO_EVENT_DEIM, Points(t, V, index));
+  HycoLogged(HYCO_EVENT_DEIM, ReducePoints(t, V, index));
   PetscCall(AddSeeds(l, index, divide, n_seeds, seeds));
   PetscCall(PetscFree(index));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -577,15 +577,15 @@ static PetscErrorCode TakeDisplacements(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rows chosen by DEIM from one field's modes, as seeds of the RID. Where a plane of symmetry is the RID, only displacements
-   seed. */
+/* Rows chosen by DEIM from one field's modes, as seeds of the RID. Where a plane of symmetry is the RID, only
+   displacements seed. */
 static PetscErrorCode TakeField(HycoReducer t, PetscInt kind, PetscInt divide, PetscInt *n_seeds, PetscInt **seeds)
 {
   Mat V;
   PetscInt l;
 
   PetscFunctionBegin;
-  if (!Seeds(t, kind) || t->plane) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!ReduceSeeds(t, kind) || t->plane) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(CutBasis(t, kind, &V, &l));
   PetscCall(SeedFrom(t, V, l, kind, divide, n_seeds, seeds));
   PetscCall(MatDestroy(&V));
@@ -737,7 +737,7 @@ static PetscErrorCode DualPoints(HycoReducer t, const PetscReal G[], PetscInt *l
       }
     }
     PetscCall(MatDenseRestoreArray(V, &v));
-    HycoLogged(HYCO_EVENT_DEIM, Points(t, V, index));
+    HycoLogged(HYCO_EVENT_DEIM, ReducePoints(t, V, index));
     PetscCall(MatDestroy(&V));
   }
   HycoFreeAll(&W, &sigma);
@@ -833,13 +833,13 @@ PetscErrorCode HycoReducerTakeBases(HycoReducer t)
   PetscCall(TakeField(t, HYCO_SEED_SPRING, dim, &t->n_seeds_node, &t->seeds_node));
   /* One component: the accumulated strain shows where laws act. */
   PetscCall(TakeField(t, HYCO_SEED_INELASTIC, 1, &t->n_seeds_cell, &t->seeds_cell));
-  if (Seeds(t, HYCO_SEED_DUAL))
+  if (ReduceSeeds(t, HYCO_SEED_DUAL))
     PetscCall(AddSeeds(t->n_dual_seeds, t->dual_seeds, 1, &t->n_seeds_node, &t->seeds_node));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The steps of predictions, where full order has chosen its own by their error in time: in each listed interval those of
-   the training path with most of them. */
+/* The steps of predictions, where full order has chosen its own by their error in time: in each listed interval those
+   of the training path with most of them. */
 static PetscErrorCode ChooseStops(HycoReducer t, PetscInt n, PetscReal time_error)
 {
   const HycoScene s = t->scene;

@@ -8,7 +8,7 @@
 const char *const HycoHybrids[] = {"auto", "rank", "contact", "all", NULL};
 
 /* Defaults of a program without options; HycoReducerSetFromOptions() changes them. */
-static PetscErrorCode Create(MPI_Comm comm, HycoReducer *reducer)
+static PetscErrorCode ReducerCreate(MPI_Comm comm, HycoReducer *reducer)
 {
   HycoReducer t;
 
@@ -73,7 +73,7 @@ PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *re
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   HycoCheckGiven(reducer);
-  PetscCall(Create(comm, reducer));
+  PetscCall(ReducerCreate(comm, reducer));
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*reducer)->scene = scene;
   /* The local problem of (43) would be a path of its own. */
@@ -534,7 +534,7 @@ PetscErrorCode HycoReducerDeclare(PetscOptions options)
   HycoReducer t;
 
   PetscFunctionBegin;
-  PetscCall(Create(PETSC_COMM_SELF, &t));
+  PetscCall(ReducerCreate(PETSC_COMM_SELF, &t));
   HycoDeclare(t, options, DeclareAll, HycoReducerDestroy);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -17,8 +17,8 @@ typedef struct {
   PetscSF to_part, to_surface;
 } Rid;
 
-/* On several ranks two star forests connect owned nodes with those of the parts (with their overlap) and of the surfaces,
-   so that layers of the label grow across the ranks. */
+/* On several ranks two star forests connect owned nodes with those of the parts (with their overlap) and of the
+   surfaces, so that layers of the label grow across the ranks. */
 static PetscErrorCode RidCreate(HycoFOM f, Rid *r)
 {
   HycoMesh part = f->part, surface = f->surface;
@@ -39,7 +39,7 @@ static PetscErrorCode RidCreate(HycoFOM f, Rid *r)
 }
 
 /* By point of the DM: a label is of points, whatever local numbers the tables have. */
-static PetscErrorCode Add(Rid *r, PetscInt cell)
+static PetscErrorCode RIDAdd(Rid *r, PetscInt cell)
 {
   PetscFunctionBegin;
   PetscCall(DMLabelSetValue(r->label, r->part->cell_point[cell], HYCO_RID));
@@ -50,7 +50,7 @@ static PetscErrorCode Add(Rid *r, PetscInt cell)
 static PetscErrorCode AddAround(Rid *r, PetscInt i)
 {
   PetscFunctionBegin;
-  for (PetscInt j = r->start[i]; j < r->start[i + 1]; j++) PetscCall(Add(r, r->around[j]));
+  for (PetscInt j = r->start[i]; j < r->start[i + 1]; j++) PetscCall(RIDAdd(r, r->around[j]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -124,7 +124,7 @@ static PetscErrorCode AddSupports(Rid *r, const HycoRIDSettings *settings)
   }
   for (PetscInt k = 0; k < settings->n_cells; k++) {
     PetscCall(FindInPart(m->n_cells, m->cell_whole, settings->cells[k], &at));
-    if (at >= 0) PetscCall(Add(&support, at));
+    if (at >= 0) PetscCall(RIDAdd(&support, at));
   }
   PetscCall(PetscMalloc1(m->n_nodes, &covered));
   PetscCall(MarkNodes(r, support.label, covered));
@@ -133,7 +133,7 @@ static PetscErrorCode AddSupports(Rid *r, const HycoRIDSettings *settings)
 
     /* Beside the supports' own cells those enclosed by them: Omega_A has no holes of one cell. */
     for (PetscInt v = 0; v < m->nv; v++) all = (PetscBool)(all && covered[m->cells[e * m->nv + v]]);
-    if (all) PetscCall(Add(r, e));
+    if (all) PetscCall(RIDAdd(r, e));
   }
   PetscCall(PetscFree(covered));
   PetscCall(DMLabelDestroy(&support.label));
@@ -149,11 +149,12 @@ static PetscErrorCode AddGroup(Rid *r, const char name[])
   PetscFunctionBegin;
   PetscCall(HycoMeshFindGroup(m, "hyco_rid_groups", name, &g));
   if (m->group_dim[g] == m->dim) {
-    for (PetscInt k = m->group_cell_start[g]; k < m->group_cell_start[g + 1]; k++) PetscCall(Add(r, m->group_cell[k]));
+    for (PetscInt k = m->group_cell_start[g]; k < m->group_cell_start[g + 1]; k++)
+      PetscCall(RIDAdd(r, m->group_cell[k]));
   } else if (m->group_dim[g] == m->dim - 1) {
     for (PetscInt f = 0; f < m->n_facets; f++) {
       /* The cell behind a facet has the unknowns that its load acts on. */
-      if (m->facet_group[f] == g) PetscCall(Add(r, m->facet_cell[f]));
+      if (m->facet_group[f] == g) PetscCall(RIDAdd(r, m->facet_cell[f]));
     }
   } else {
     for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) PetscCall(AddAround(r, m->group_node[k]));
@@ -241,7 +242,7 @@ static PetscErrorCode ExtendContact(Rid *r, const HycoPairs *pairs, PetscReal d)
 
       for (PetscInt v = 0; v < n; v++) on += near[of[v]] > 0;
       /* A cell with a facet on Gamma^C, not one that touches it in a node or an edge. */
-      if (on >= SmallestFacet(m, r->around[j]) - HycoMeshFirstCarrier(m)) PetscCall(Add(r, r->around[j]));
+      if (on >= SmallestFacet(m, r->around[j]) - HycoMeshFirstCarrier(m)) PetscCall(RIDAdd(r, r->around[j]));
     }
   }
   PetscCall(PetscFree4(node, in, near_on, near));
@@ -282,7 +283,7 @@ static PetscErrorCode AddBehind(Rid *r, PetscInt i, PetscInt n, const PetscBool 
 
     for (PetscInt v = 0; v < own; v++) has += marked[of[v]];
     /* A cell with a whole facet of masters: cells that only touch at an edge are not behind the contact. */
-    if (has >= PetscMin(n, SmallestFacet(m, r->around[j]))) PetscCall(Add(r, r->around[j]));
+    if (has >= PetscMin(n, SmallestFacet(m, r->around[j]))) PetscCall(RIDAdd(r, r->around[j]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -425,10 +426,10 @@ static PetscErrorCode AddRegions(Rid *r, const HycoRIDSettings *settings)
   /* A model that has chosen its cells: nothing is added, not even for rigid bodies. */
   for (PetscInt k = 0; settings->exact && k < settings->n_cells; k++) {
     PetscCall(FindInPart(r->part->n_cells, r->part->cell_whole, settings->cells[k], &at));
-    if (at >= 0) PetscCall(Add(r, at));
+    if (at >= 0) PetscCall(RIDAdd(r, at));
   }
   if (settings->exact) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt e = 0; settings->whole && e < r->part->n_cells; e++) PetscCall(Add(r, e));
+  for (PetscInt e = 0; settings->whole && e < r->part->n_cells; e++) PetscCall(RIDAdd(r, e));
   for (PetscInt k = 0; k < settings->n_groups; k++) PetscCall(AddGroup(r, settings->groups[k]));
   /* All cells at the plane: the RID then cuts the bodies from side to side. */
   if (settings->plane) PetscCall(AddGroup(r, settings->plane));

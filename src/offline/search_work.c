@@ -37,7 +37,8 @@ PetscReal HycoReducerSolvesOf(HycoReducer t)
 }
 
 /* Whether two points have the same stiffness. */
-static PetscBool Alike(HycoScene s, const PetscBool reaches[], const PetscReal a[], const PetscReal b[])
+static PetscBool SearchWorkIsSameStiffness(HycoScene s, const PetscBool reaches[], const PetscReal a[],
+                                           const PetscReal b[])
 {
   for (PetscInt p = 0; p < s->n_parameters; p++) {
     if (reaches[p] && a[p] != b[p]) return PETSC_FALSE;
@@ -61,7 +62,7 @@ PetscErrorCode HycoReducerCountStiffnesses(HycoReducer t, HycoSamples samples, P
 
     /* In order a factor is kept only from the point before; otherwise points are grouped by stiffness. */
     for (PetscInt j = in_order ? PetscMax(k - 1, 0) : 0; j < k && !seen; j++)
-      seen = Alike(t->scene, reaches, mu + j * n_par, mu + k * n_par);
+      seen = SearchWorkIsSameStiffness(t->scene, reaches, mu + j * n_par, mu + k * n_par);
     *count += !seen;
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -3,9 +3,9 @@
   points are small enough. The snapshots are read and their bases made once; an attempt truncates the bases, builds the
   RID and the model on it and predicts the held-out points.
 
-  Types with modes of their own (HycoROMTraits.own_modes) come first, judged by the held-out solutions before any training
-  point is solved; over paths, whose inelastic modes need the training solutions, after that. If one of them is accurate
-  enough, that ends the search, and its model is the one of the attempt.
+  Types with modes of their own (HycoROMTraits.own_modes) come first, judged by the held-out solutions before any
+  training point is solved; over paths, whose inelastic modes need the training solutions, after that. If one of them is
+  accurate enough, that ends the search, and its model is the one of the attempt.
 
   Only settings that no option fixes are varied. The settings of a kind are tried in the order of their cost, and the
   first that meet the targets end their kind; if they meet them with a margin, they end the search. So do attempts that
@@ -24,20 +24,22 @@
 
 #define EXTENSION     2.5 /* edges of the contact surface's facets */
 #define MANY_UNKNOWNS 600 /* largest RID for which "all" is tried automatically: its reduced matrix is dense */
-#define STALE                                                                                                          \
+#define STALLED_ATTEMPTS                                                                                               \
   3 /* attempts without progress that end a kind: a larger RID does not help if the basis lacks                        \
        solutions */
-#define PROGRESS     0.95
-#define NO_EFFECT    0.05 /* relative change of the ratio that counts as none */
-#define MARGIN       0.1  /* ratio of settings that end the search */
-#define LEAST        2    /* models that are tried whatever they cost */
-#define USELESS      0.5  /* a larger error of u is that of no model: the budget does not end the search there */
-#define WILD         50   /* multiple of the target: above it no attempt so far gives a useful model */
-#define FEW_UNKNOWNS 300  /* a dense matrix of this size is cheap */
-#define MAX_ATTEMPTS 64
-#define ROUND        4   /* share of the training points that is added at a time, as a divisor */
-#define TELLING      0.3 /* correlation above which a parameter explains the errors */
-#define WHOLE        -1
+#define PROGRESS  0.95
+#define NO_EFFECT 0.05 /* relative change of the ratio that counts as none */
+#define MARGIN    0.1  /* ratio of settings that end the search */
+#define LEAST     2    /* models that are tried whatever they cost */
+#define USELESS                                                                                                        \
+  0.5                               /* a larger error of u is that of no model: the budget does not end the search
+                                       there */
+#define HOPELESS_ERROR          50  /* multiple of the target: above it no attempt so far gives a useful model */
+#define FEW_UNKNOWNS            300 /* a dense matrix of this size is cheap */
+#define MAX_ATTEMPTS            64
+#define ROUND                   4   /* share of the training points that is added at a time, as a divisor */
+#define EXPLANATORY_CORRELATION 0.3 /* correlation above which a parameter explains the errors */
+#define WHOLE                   -1
 
 /* Sizes of RIDs and bases, the cheapest first; layers WHOLE: the whole mesh. */
 typedef struct {
@@ -164,7 +166,7 @@ static PetscReal QuotientOf(const Search *s, PetscInt kind, PetscReal error)
 }
 
 /* The largest at a held-out point. */
-static PetscReal Quotient(const Search *s, const HycoHeldOut *row)
+static PetscReal SearchQuotient(const Search *s, const HycoHeldOut *row)
 {
   PetscReal ratio = 0;
 
@@ -174,7 +176,7 @@ static PetscReal Quotient(const Search *s, const HycoHeldOut *row)
 }
 
 /* The largest quotient of the attempt's errors. */
-static void Rate(const Search *s, HycoAttempt *a)
+static void SearchRate(const Search *s, HycoAttempt *a)
 {
   a->ratio = 0;
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
@@ -204,12 +206,13 @@ static PetscErrorCode RateCorners(Search *s, HycoROM model, const HycoHeldOut ro
   HycoFinally(HycoReducerJudgeCorners(t, corners, a->n_held, model, s->store, all, &a->held_out),
               PetscCall(HycoSamplesDestroy(&corners));
               PetscCall(PetscFree(all)));
-  Rate(s, a);
+  SearchRate(s, a);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The errors at the held-out points that were predicted, and their largest quotient. */
-static PetscErrorCode Summarise(Search *s, const HycoHeldOutRace *race, const HycoHeldOut rows[], HycoAttempt *a)
+static PetscErrorCode SearchSummarise(Search *s, const HycoHeldOutEarlyStop *race, const HycoHeldOut rows[],
+                                      HycoAttempt *a)
 {
   HycoHeldOut *some;
   PetscReal force = s->force;
@@ -223,13 +226,13 @@ static PetscErrorCode Summarise(Search *s, const HycoHeldOutRace *race, const Hy
   PetscCall(PetscFree(some));
   /* The size of forces is the full-order solutions': known once all points were compared. */
   if (race->n == a->n_held && !a->held_out.not_converged) s->force = force;
-  Rate(s, a);
+  SearchRate(s, a);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Reorders the points: the next attempt begins with those where this one had the largest errors; for a dropped one,
    with the one at which it was dropped. */
-static PetscErrorCode Reorder(Search *s, const HycoHeldOutRace *race, const HycoHeldOut rows[], PetscInt n)
+static PetscErrorCode SearchReorder(Search *s, const HycoHeldOutEarlyStop *race, const HycoHeldOut rows[], PetscInt n)
 {
   PetscReal *key;
   PetscInt *order = s->order, last = race->n - 1;
@@ -245,7 +248,7 @@ static PetscErrorCode Reorder(Search *s, const HycoHeldOutRace *race, const Hyco
   }
   PetscCall(PetscMalloc1(n, &key));
   for (PetscInt k = 0; k < n; k++) {
-    key[k] = -Quotient(s, &rows[k]);
+    key[k] = -SearchQuotient(s, &rows[k]);
     order[k] = k;
   }
   PetscCall(PetscSortRealWithArrayInt(n, key, order));
@@ -256,17 +259,17 @@ static PetscErrorCode Reorder(Search *s, const HycoHeldOutRace *race, const Hyco
 /* Judges the model at the held-out points; for paths only until it is clear that the settings will not be chosen,
    unless `all` is set. Results of paths are kept (s->rows) if all points were predicted: the chosen attempt is
    then not judged again. */
-static PetscErrorCode Judge(Search *s, HycoROM model, PetscBool all, HycoAttempt *a)
+static PetscErrorCode SearchJudge(Search *s, HycoROM model, PetscBool all, HycoAttempt *a)
 {
   HycoReducer t = s->t;
   const PetscInt n = a->n_held;
   PetscInt beaten;
   HycoHeldOut *rows;
-  HycoHeldOutRace race = {.order = s->order,
-                          .target = s->target,
-                          .limit = s->limit,
-                          .force = s->force,
-                          .all = (PetscBool)(all || t->exhaustive)};
+  HycoHeldOutEarlyStop race = {.order = s->order,
+                               .target = s->target,
+                               .limit = s->limit,
+                               .force = s->force,
+                               .all = (PetscBool)(all || t->exhaustive)};
 
   PetscFunctionBegin;
   a->ratio = PETSC_INFINITY;
@@ -276,7 +279,7 @@ static PetscErrorCode Judge(Search *s, HycoROM model, PetscBool all, HycoAttempt
   s->rows[s->n - 1] = rows;
   PetscCall(HycoReducerPredictHeldOut(t, t->held, model, s->store, t->scene->n_times ? &race : NULL, rows));
   if (!t->scene->n_times) race.n = n;
-  PetscCall(Summarise(s, &race, rows, a));
+  PetscCall(SearchSummarise(s, &race, rows, a));
   PetscCall(RateCorners(s, model, rows, a));
   if (race.lost) {
     a->dropped_at = s->order[race.n - 1];
@@ -285,10 +288,10 @@ static PetscErrorCode Judge(Search *s, HycoROM model, PetscBool all, HycoAttempt
   for (PetscInt k = 0; k < race.n && a->ratio <= s->least && !a->beaten_by; k++) {
     const PetscInt point = race.n < n ? s->order[k] : k;
 
-    s->ratio[point] = Quotient(s, &rows[point]);
+    s->ratio[point] = SearchQuotient(s, &rows[point]);
   }
   if (!a->beaten_by) s->least = PetscMin(s->least, a->ratio);
-  if (t->scene->n_times) PetscCall(Reorder(s, &race, rows, n));
+  if (t->scene->n_times) PetscCall(SearchReorder(s, &race, rows, n));
   if (race.n < n || !t->scene->n_times) PetscCall(PetscFree(s->rows[s->n - 1]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -317,7 +320,7 @@ static PetscInt MetFor(const Search *s, PetscReal cost)
 }
 
 /* The bases of the columns' solutions, unless they are there. */
-static PetscErrorCode Reduce(Search *s)
+static PetscErrorCode SearchReduce(Search *s)
 {
   PetscFunctionBegin;
   if (s->reduced) PetscFunctionReturn(PETSC_SUCCESS);
@@ -351,7 +354,7 @@ static PetscErrorCode BuildAndJudge(Search *s, PetscBool all, HycoAttempt *a)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(Reduce(s));
+  PetscCall(SearchReduce(s));
   PetscCall(TakeModes(t, s->store));
   PetscCall(HycoReducerBuild(t, final, &model, &report));
   TakeSizes(t, &report, a);
@@ -359,7 +362,7 @@ static PetscErrorCode BuildAndJudge(Search *s, PetscBool all, HycoAttempt *a)
   PetscCallMPI(MPI_Bcast(&t->ridge, 1, MPIU_REAL, 0, HycoComm(t)));
   a->settings.ridge = t->ridge;
   a->beaten_by = all || t->exhaustive ? 0 : MetFor(s, a->cost);
-  ierr = a->beaten_by ? PETSC_SUCCESS : Judge(s, model, all, a); /* a model may refuse to predict */
+  ierr = a->beaten_by ? PETSC_SUCCESS : SearchJudge(s, model, all, a); /* a model may refuse to predict */
   if (final && !ierr) {
     s->kept = model;
     s->kept_report = report;
@@ -376,7 +379,7 @@ static PetscBool IsUseful(const HycoAttempt *a)
 }
 
 /* Whether a type with modes of its own has given one, with which a search may end that finds no other. */
-static PetscBool Stands(const Search *s)
+static PetscBool SearchHasModel(const Search *s)
 {
   for (PetscInt k = 0; k < s->n_own; k++) {
     if (IsUseful(&s->attempt[k])) return PETSC_TRUE;
@@ -386,7 +389,7 @@ static PetscBool Stands(const Search *s)
 
 /* Whether the budget has room for an attempt like the last one. By the last attempt's work: later ones of a kind
    are larger, so that this errs to the side of one more attempt. */
-static PetscBool Affords(Search *s, const HycoReducerSettings *settings)
+static PetscBool SearchIsAffordable(Search *s, const HycoReducerSettings *settings)
 {
   const PetscReal given = s->t->search_budget;
   PetscReal enough;
@@ -394,7 +397,7 @@ static PetscBool Affords(Search *s, const HycoReducerSettings *settings)
 
   /* The first attempts are always made: without any there is no model. */
   if (s->spent + s->last <= s->budget) return PETSC_TRUE;
-  if (s->n_models < LEAST && !(Stands(s) && s->n - s->n_own >= LEAST)) return PETSC_TRUE;
+  if (s->n_models < LEAST && !(SearchHasModel(s) && s->n - s->n_own >= LEAST)) return PETSC_TRUE;
   /* Twice what was spent, so that a search that takes it goes on. */
   enough = given * 2 * (s->spent - s->own + s->last) / (s->budget - s->own);
   if (given > 0)
@@ -413,7 +416,8 @@ static PetscBool Affords(Search *s, const HycoReducerSettings *settings)
 }
 
 /* Operations of n predictions at training or held-out points: the cost of an attempt is that at a new stiffness. */
-static PetscErrorCode Predictions(HycoReducer t, HycoSamples points, PetscReal n, const HycoAttempt *a, PetscReal *work)
+static PetscErrorCode SearchPredictions(HycoReducer t, HycoSamples points, PetscReal n, const HycoAttempt *a,
+                                        PetscReal *work)
 {
   const PetscReal unknowns = (PetscReal)a->n_modes + (PetscReal)a->n_fe_dofs;
   PetscInt n_points, stiffnesses;
@@ -430,7 +434,7 @@ static PetscErrorCode Predictions(HycoReducer t, HycoSamples points, PetscReal n
 
 /* Adds the operations of an attempt: the type's own, predictions at training and held-out points, and their comparison
    on the whole mesh. */
-static PetscErrorCode Count(Search *s, HycoAttempt *a)
+static PetscErrorCode SearchCount(Search *s, HycoAttempt *a)
 {
   HycoReducer t = s->t;
   /* Modes times coefficients for each comparison on the whole mesh, and the stresses of its cells. */
@@ -444,8 +448,8 @@ static PetscErrorCode Count(Search *s, HycoAttempt *a)
   /* Counted on rank 0, where models are built and judged. */
   PetscCallMPI(MPI_Bcast(numbers, 2, MPIU_INT, 0, HycoComm(t)));
   a->n_unknowns = numbers[1];
-  PetscCall(Predictions(t, t->samples, numbers[0], a, &judging));
-  PetscCall(Predictions(t, t->held, repeats * held, a, &testing));
+  PetscCall(SearchPredictions(t, t->samples, numbers[0], a, &judging));
+  PetscCall(SearchPredictions(t, t->held, repeats * held, a, &testing));
   s->last = judging + testing + whole * ((PetscReal)t->n_s + held * (PetscReal)HycoSnapshotsSteps(t->scene));
   if (t->trainer.work && !a->failure[0]) s->last += (*t->trainer.work)(t);
   s->spent += s->last;
@@ -457,7 +461,7 @@ static PetscErrorCode Count(Search *s, HycoAttempt *a)
 /* Builds a model with these settings and judges it, at all held-out points or as far as necessary; an error becomes
    a failed attempt. Collective. Errors of other kinds than "no model" (HYCO_ERR_NO_MODEL) end the search:
    HycoCatchNoModel() raises them again. */
-static PetscErrorCode Make(Search *s, const HycoReducerSettings *settings, PetscBool all, HycoAttempt *a)
+static PetscErrorCode SearchMake(Search *s, const HycoReducerSettings *settings, PetscBool all, HycoAttempt *a)
 {
   HycoReducer t = s->t;
   PetscErrorCode ierr;
@@ -490,13 +494,13 @@ static PetscErrorCode Make(Search *s, const HycoReducerSettings *settings, Petsc
 
 /* The next attempt; none if the budget is used up. Collective. The order of events is that of the monitor:
    attempt, counts, report. `all`: a dropped attempt is judged to its end, whatever is spent. */
-static PetscErrorCode Try(Search *s, const HycoReducerSettings *settings, PetscBool all)
+static PetscErrorCode SearchTry(Search *s, const HycoReducerSettings *settings, PetscBool all)
 {
   HycoReducer t = s->t;
   HycoAttempt *a = &s->attempt[s->n];
 
   PetscFunctionBegin;
-  if (s->n == MAX_ATTEMPTS || (!all && !Affords(s, settings))) {
+  if (s->n == MAX_ATTEMPTS || (!all && !SearchIsAffordable(s, settings))) {
     s->ended = PETSC_TRUE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -507,8 +511,8 @@ static PetscErrorCode Try(Search *s, const HycoReducerSettings *settings, PetscB
   a->settings = *settings;
   a->dropped_at = -1;
   PetscCall(HycoSamplesGet(t->held, &a->n_held, NULL, NULL));
-  PetscCall(Make(s, settings, all, a));
-  PetscCall(Count(s, a));
+  PetscCall(SearchMake(s, settings, all, a));
+  PetscCall(SearchCount(s, a));
   if (t->attempt) HycoOnRoot(HycoComm(t), t->attempt(a, t->attempt_ctx));
   if (t->phase) HycoOnRoot(HycoComm(t), t->phase("settings tried", s->n, 0, t->phase_ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -528,7 +532,7 @@ static HycoReducerSettings SettingsFor(const Search *s, const Size *size)
 }
 
 /* Bitwise equality of the numbers suffices: settings are taken from lists, not computed. */
-static PetscBool Same(const HycoReducerSettings *a, const HycoReducerSettings *b)
+static PetscBool SearchIsSame(const HycoReducerSettings *a, const HycoReducerSettings *b)
 {
   return (PetscBool)(strcmp(a->type, b->type) == 0 && a->pod_tol == b->pod_tol && a->layers == b->layers &&
                      a->whole == b->whole && a->contact_extension == b->contact_extension && a->hybrid == b->hybrid &&
@@ -577,11 +581,11 @@ static PetscBool HasNoEffect(const Search *s, PetscInt first)
 
 /* The number of attempts in a row, up to the last one, without progress. With large errors, and for paths, whose
    dropped attempts do not show it, only those without an effect count, and those of no use if a model stands. */
-static PetscInt CountStale(const Search *s, PetscInt first, PetscReal least, PetscInt stale)
+static PetscInt CountFailedAttempts(const Search *s, PetscInt first, PetscReal least, PetscInt stale)
 {
-  const PetscBool slow = (PetscBool)(least <= WILD && !s->t->scene->n_times);
+  const PetscBool slow = (PetscBool)(least <= HOPELESS_ERROR && !s->t->scene->n_times);
 
-  if (s->t->scene->n_times && !IsUseful(&s->attempt[s->n - 1]) && Stands(s)) return stale + 1;
+  if (s->t->scene->n_times && !IsUseful(&s->attempt[s->n - 1]) && SearchHasModel(s)) return stale + 1;
   if (s->attempt[s->n - 1].ratio < PROGRESS * least) return 0;
   return slow || HasNoEffect(s, first) ? stale + 1 : 0;
 }
@@ -608,7 +612,7 @@ static HycoReducerSettings KindFor(const Search *s, const HycoROM type, HycoHybr
    differ in the settings that the type reads. */
 static PetscErrorCode TrySizes(Search *s, const HycoROM type, HycoHybrid hybrid, PetscBool *met)
 {
-  const PetscInt first = s->n, most = s->t->exhaustive ? N_SIZES : STALE;
+  const PetscInt first = s->n, most = s->t->exhaustive ? N_SIZES : STALLED_ATTEMPTS;
   PetscReal least = PETSC_INFINITY;
   PetscInt stale = 0;
 
@@ -619,11 +623,11 @@ static PetscErrorCode TrySizes(Search *s, const HycoROM type, HycoHybrid hybrid,
     const HycoReducerSettings r = KindFor(s, type, hybrid, &sizes[k]);
     PetscBool done = PETSC_FALSE;
 
-    for (PetscInt j = first; j < s->n; j++) done = (PetscBool)(done || Same(&r, &s->attempt[j].settings));
+    for (PetscInt j = first; j < s->n; j++) done = (PetscBool)(done || SearchIsSame(&r, &s->attempt[j].settings));
     if (done || (r.whole && !s->given.whole && !WholeIsSmall(s->t, hybrid)) || IsTooLarge(s, &r)) continue;
-    PetscCall(Try(s, &r, PETSC_FALSE));
+    PetscCall(SearchTry(s, &r, PETSC_FALSE));
     if (s->ended) break;
-    stale = CountStale(s, first, least, stale);
+    stale = CountFailedAttempts(s, first, least, stale);
     if (!s->attempt[s->n - 1].beaten_by || s->attempt[s->n - 1].dropped_at >= 0)
       least = PetscMin(least, s->attempt[s->n - 1].ratio);
     else
@@ -721,7 +725,7 @@ static PetscErrorCode TryPlanes(Search *s, const HycoROM type, PetscBool *met)
     r.plane = s->plane;
     /* The further attempts only differ in the tolerance. */
     if (k && pinned[HYCO_CHOICE_TOLERANCE]) break;
-    PetscCall(Try(s, &r, PETSC_FALSE));
+    PetscCall(SearchTry(s, &r, PETSC_FALSE));
     if (s->ended) break;
     *met = (PetscBool)(s->attempt[s->n - 1].ratio <= 1);
   }
@@ -763,7 +767,7 @@ static PetscErrorCode TryOne(Search *s, const HycoROM type)
   if (!variant) variant = one;
   do {
     r.variant = *variant++;
-    PetscCall(Try(s, &r, PETSC_FALSE));
+    PetscCall(SearchTry(s, &r, PETSC_FALSE));
     met = (PetscBool)(s->attempt[s->n - 1].ratio <= 1 && !s->t->exhaustive);
     /* Ordered by cost: the first that meets the targets is the cheapest. */
   } while (*variant && !met && !s->ended);
@@ -772,14 +776,14 @@ static PetscErrorCode TryOne(Search *s, const HycoROM type)
 
 /* Whether these settings end the search: by their errors, with a margin unless their type has modes of its own, which
    is cheaper than others and may save the training solutions. */
-static PetscBool Ends(const Search *s, const HycoAttempt *best)
+static PetscBool SearchEndsWith(const Search *s, const HycoAttempt *best)
 {
   return (PetscBool)(best && best->ratio <= (best->number <= s->n_own ? 1 : MARGIN) && !s->t->exhaustive);
 }
 
 /* Lets a type refuse the scene's contacts, one with modes of its own the scene: why. Collective. begin() needs the
    type's options: the type is set, and a refusal is caught with its message. */
-static PetscErrorCode Refuse(HycoReducer t, const HycoROM type, char why[HYCO_LINE])
+static PetscErrorCode SearchRefuse(HycoReducer t, const HycoROM type, char why[HYCO_LINE])
 {
   HycoTrainerOps trainer;
   PetscErrorCode ierr;
@@ -798,8 +802,8 @@ static PetscErrorCode Refuse(HycoReducer t, const HycoROM type, char why[HYCO_LI
 
 /* Whether a type offers a model of the scene, within the operations that the search may take; otherwise why may be
    set. Collective. */
-static PetscErrorCode Offers(Search *s, const HycoROM type, PetscBool *offered, PetscBool *possible,
-                             char why[HYCO_LINE])
+static PetscErrorCode SearchIsOffered(Search *s, const HycoROM type, PetscBool *offered, PetscBool *possible,
+                                      char why[HYCO_LINE])
 {
   HycoReducer t = s->t;
   PetscReal work = 0, most = s->budget;
@@ -807,7 +811,7 @@ static PetscErrorCode Offers(Search *s, const HycoROM type, PetscBool *offered, 
 
   PetscFunctionBegin;
   PetscCall(HycoTrainerFind(type->model->type, &trainer));
-  PetscCall(Refuse(t, type, why));
+  PetscCall(SearchRefuse(t, type, why));
   *possible = (PetscBool)!why[0];
   /* Refused: the reason goes into the report. */
   if (why[0]) PetscFunctionReturn(PETSC_SUCCESS);
@@ -827,7 +831,7 @@ static PetscErrorCode Offers(Search *s, const HycoROM type, PetscBool *offered, 
 
 /* Whether a type is tried; otherwise, if the user should know, it is noted with the reason. HycoAttemptsChoose()
    on the attempts so far: whether they end the search is asked before a type is set up. */
-static PetscErrorCode Wants(Search *s, const HycoROM type, PetscBool *wanted)
+static PetscErrorCode SearchIsApplicable(Search *s, const HycoROM type, PetscBool *wanted)
 {
   HycoReducer t = s->t;
   const HycoAttempt *best = HycoAttemptsChoose(s->n, s->attempt);
@@ -846,8 +850,9 @@ static PetscErrorCode Wants(Search *s, const HycoROM type, PetscBool *wanted)
     if (type->model->traits.own_modes) HycoFormat(why, "it does not support scenes with a history");
   }
   /* A search that has ended does not set up a type that learns by itself. */
-  if (*wanted && !(HycoReducerOwnModes(t, type) && Ends(s, best))) PetscCall(Offers(s, type, wanted, &possible, why));
-  if (*wanted && Ends(s, best))
+  if (*wanted && !(HycoReducerOwnModes(t, type) && SearchEndsWith(s, best)))
+    PetscCall(SearchIsOffered(s, type, wanted, &possible, why));
+  if (*wanted && SearchEndsWith(s, best))
     snprintf(why, sizeof(why),
              t->late                    ? "settings %d are accurate enough, without training solutions"
              : best->number <= s->n_own ? "settings %d are accurate enough"
@@ -869,7 +874,7 @@ static PetscErrorCode TryType(Search *s, const char name[], PetscBool own)
   PetscCall(HycoROMCreate(&type));
   PetscCall(HycoROMSetType(type, name));
   wanted = PETSC_FALSE;
-  if (HycoReducerOwnModes(s->t, type) == own) PetscCall(Wants(s, type, &wanted));
+  if (HycoReducerOwnModes(s->t, type) == own) PetscCall(SearchIsApplicable(s, type, &wanted));
   if (wanted && type->model->traits.settings == HYCO_SETTINGS_NONE) PetscCall(TryOne(s, type));
   if (wanted && type->model->traits.settings == HYCO_SETTINGS_RID) PetscCall(TryHybrids(s, type));
   if (wanted && type->model->traits.settings == HYCO_SETTINGS_MODES)
@@ -915,7 +920,7 @@ static PetscErrorCode TakeColumns(HycoReducer t, HycoSnapshots store, PetscBool 
 }
 
 /* The attempt chosen so far; a dropped one that may be chosen now is judged first. */
-static PetscErrorCode Choose(Search *s, HycoAttempt **chosen)
+static PetscErrorCode SearchChoose(Search *s, HycoAttempt **chosen)
 {
   HycoAttempt *again;
 
@@ -925,14 +930,14 @@ static PetscErrorCode Choose(Search *s, HycoAttempt **chosen)
 
     /* Before the attempt, which gets a number of its own: a loop must not find this one again. */
     again->reopened = PETSC_TRUE;
-    PetscCall(Try(s, &settings, PETSC_TRUE));
+    PetscCall(SearchTry(s, &settings, PETSC_TRUE));
   }
   *chosen = HycoAttemptsChoose(s->n, s->attempt);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Whether all settings are fixed, or there are no held-out points. */
-static PetscBool Settled(HycoReducer t)
+static PetscBool SearchIsSettled(HycoReducer t)
 {
   PetscBool open = PETSC_FALSE;
 
@@ -943,8 +948,8 @@ static PetscBool Settled(HycoReducer t)
 }
 
 /* Correlation of the held-out points' errors with their distance from the nearest training value of parameter p. */
-static PetscReal Correlation(const Search *s, PetscInt n, const PetscReal held[], PetscInt n_train,
-                             const PetscReal train[], PetscInt p)
+static PetscReal SearchCorrelation(const Search *s, PetscInt n, const PetscReal held[], PetscInt n_train,
+                                   const PetscReal train[], PetscInt p)
 {
   const PetscInt n_par = s->t->scene->n_parameters;
   PetscReal mean[2] = {0, 0}, square[2] = {0, 0}, both = 0;
@@ -970,18 +975,18 @@ static PetscReal Correlation(const Search *s, PetscInt n, const PetscReal held[]
 }
 
 /* The parameter whose training values are too far apart (-1: none in particular). */
-static PetscErrorCode FindTelling(Search *s, HycoSamples samples, PetscInt *by)
+static PetscErrorCode FindExplanatoryParameter(Search *s, HycoSamples samples, PetscInt *by)
 {
   PetscInt n, n_train;
   const PetscReal *held, *train;
-  PetscReal largest = TELLING;
+  PetscReal largest = EXPLANATORY_CORRELATION;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(s->t->held, &n, NULL, &held));
   PetscCall(HycoSamplesGet(samples, &n_train, NULL, &train));
   *by = -1;
   for (PetscInt p = 0; p < s->t->scene->n_parameters; p++) {
-    const PetscReal c = Correlation(s, n, held, n_train, train, p);
+    const PetscReal c = SearchCorrelation(s, n, held, n_train, train, p);
 
     /* Errors that grow with the distance from the training values of one parameter name that parameter. */
     if (c > largest) {
@@ -1007,9 +1012,9 @@ static PetscErrorCode AddPoints(Search *s, HycoSamples samples, PetscInt n_add, 
   PetscFunctionBegin;
   *added = 0;
   PetscCall(HycoSamplesGet(t->held, &n, NULL, &held));
-  PetscCall(FindTelling(s, samples, by));
+  PetscCall(FindExplanatoryParameter(s, samples, by));
   /* Eight times as many candidates as points: each added one can be near a bad held-out point without being it. */
-  PetscCall(HycoSamplesUnseen(samples, t->drawn, among, 1, NULL, &drawn));
+  PetscCall(HycoSamplesOutsideTraining(samples, t->drawn, among, 1, NULL, &drawn));
   t->drawn += among;
   PetscCall(HycoSamplesExcept(drawn, t->held, &unseen));
   PetscCall(HycoSamplesDestroy(&drawn));
@@ -1045,7 +1050,7 @@ static PetscErrorCode AddPoints(Search *s, HycoSamples samples, PetscInt n_add, 
 
 /* Frees the data of attempts. Also frees rows of attempts that were never chosen; ratio and order belong to the
    held-out points of these. */
-static void Forget(Search *s)
+static void SearchReset(Search *s)
 {
   for (PetscInt k = 0; k < s->n; k++) (void)!PetscFree(s->rows[k]);
   (void)!PetscFree2(s->ratio, s->order);
@@ -1079,10 +1084,10 @@ static PetscErrorCode BeginHeld(Search *s)
 }
 
 /* Tries all settings that are not fixed. */
-static PetscErrorCode Attempts(Search *s)
+static PetscErrorCode SearchAttempts(Search *s)
 {
   PetscFunctionBegin;
-  Forget(s);
+  SearchReset(s);
   PetscCall(BeginHeld(s));
   s->least = PETSC_INFINITY;
   s->n_models = s->n_left_out = 0;
@@ -1092,7 +1097,7 @@ static PetscErrorCode Attempts(Search *s)
   s->budget += s->own; /* which counts in what is spent */
   PetscCall(TakeColumns(s->t, s->store, PETSC_TRUE));
   PetscCall(TryAll(s, PETSC_TRUE));
-  if (!Ends(s, HycoAttemptsChoose(s->n, s->attempt)) && !IsOwn(s->t)) {
+  if (!SearchEndsWith(s, HycoAttemptsChoose(s->n, s->attempt)) && !IsOwn(s->t)) {
     const HycoSamples before = s->t->columns;
     const PetscBool few = s->t->few;
 
@@ -1101,7 +1106,7 @@ static PetscErrorCode Attempts(Search *s)
     PetscCall(TakeColumns(s->t, s->store, PETSC_FALSE));
     /* Bases of held-out points are not those of the training points. */
     s->reduced = (PetscBool)(s->reduced && s->t->columns == before);
-    PetscCall(Reduce(s));
+    PetscCall(SearchReduce(s));
   }
   PetscCall(TryAll(s, PETSC_FALSE));
   if (s->t->phase) HycoOnRoot(HycoComm(s->t), s->t->phase("settings tried", s->n, s->n, s->t->phase_ctx));
@@ -1134,7 +1139,7 @@ static PetscErrorCode TrainOn(Search *s, HycoSamples grown)
 }
 
 /* What would help next if the errors are too large, beside more points. */
-static PetscErrorCode Advise(Search *s, HycoTraining *report)
+static PetscErrorCode SearchAdvise(Search *s, HycoTraining *report)
 {
   HycoReducer t = s->t;
   PetscInt by;
@@ -1143,7 +1148,7 @@ static PetscErrorCode Advise(Search *s, HycoTraining *report)
   PetscBool cubature = PETSC_FALSE;
 
   PetscFunctionBegin;
-  PetscCall(FindTelling(s, t->samples, &by));
+  PetscCall(FindExplanatoryParameter(s, t->samples, &by));
   /* More values of one parameter cost fewer solutions than more of all. Modes of a type's own do not follow them. */
   if (by >= 0 && report->chosen.settings.pod)
     snprintf(values, sizeof(values), "give more values of %s, whose training values are too far apart",
@@ -1174,7 +1179,7 @@ static PetscErrorCode Advise(Search *s, HycoTraining *report)
 
 /* Puts into the report what the search has done. After BuildChosen(), whose report is overwritten by what belongs
    to the search. */
-static PetscErrorCode Tell(Search *s, const HycoAttempt *best, HycoTraining *report)
+static PetscErrorCode SearchWriteReport(Search *s, const HycoAttempt *best, HycoTraining *report)
 {
   PetscFunctionBegin;
   report->chosen = *best;
@@ -1183,7 +1188,7 @@ static PetscErrorCode Tell(Search *s, const HycoAttempt *best, HycoTraining *rep
   PetscCall(HycoReducerSolutionsWork(s->t, &report->solution_operations));
   report->n_left_out = s->n_left_out;
   PetscCall(PetscArraycpy(report->left_out, s->left_out, s->n_left_out));
-  PetscCall(Advise(s, report));
+  PetscCall(SearchAdvise(s, report));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -1198,7 +1203,7 @@ static PetscErrorCode BuildChosen(Search *s, const HycoAttempt *best, HycoROM *m
     s->kept = NULL;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(Reduce(s));
+  PetscCall(SearchReduce(s));
   PetscCall(TakeModes(s->t, s->store));
   PetscCall(HycoReducerBuild(s->t, PETSC_TRUE, model, built));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -1217,7 +1222,7 @@ static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
   for (;;) {
     HycoTraining built = {0};
 
-    PetscCall(Choose(s, &best));
+    PetscCall(SearchChoose(s, &best));
     if (!best) break;
     PetscCall(SetSettings(t, &best->settings));
     HycoCatch(BuildChosen(s, best, model, &built), ierr, message);
@@ -1230,7 +1235,7 @@ static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
     built.n_former = report->n_former;
     built.n_fresh = report->n_fresh;
     *report = built;
-    PetscCall(Tell(s, best, report));
+    PetscCall(SearchWriteReport(s, best, report));
     /* The reducer owns them now, and calibrates with them. */
     t->judged_held = s->rows[best->number - 1];
     s->rows[best->number - 1] = NULL;
@@ -1285,7 +1290,7 @@ static PetscErrorCode WorstQuotient(Search *s, HycoROM model, PetscReal *worst)
   HycoOnError(HycoReducerPredictHeldOut(s->t, s->t->held, model, s->store, NULL, rows), PetscCall(PetscFree(rows)));
   s->force = HycoHeldOutForce(n, rows);
   *worst = 0;
-  for (PetscInt k = 0; k < n; k++) *worst = PetscMax(*worst, Quotient(s, &rows[k]));
+  for (PetscInt k = 0; k < n; k++) *worst = PetscMax(*worst, SearchQuotient(s, &rows[k]));
   PetscCall(PetscFree(rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -1339,8 +1344,9 @@ static PetscErrorCode KeepBest(Search *s, const HycoTraining *report)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether an error ends the search although it has a model: not of a solve at a point that was added, or of an attempt. */
-static PetscErrorCode Survive(Search *s, PetscErrorCode ierr, const char message[], PetscBool has)
+/* Whether an error ends the search although it has a model: not of a solve at a point that was added, or of an
+   attempt. */
+static PetscErrorCode SearchSurvive(Search *s, PetscErrorCode ierr, const char message[], PetscBool has)
 {
   char line[HYCO_LINE];
 
@@ -1355,7 +1361,7 @@ static PetscErrorCode Survive(Search *s, PetscErrorCode ierr, const char message
 /* Attempts, and solutions added until the targets are met or the budget is used up: in *grown, with the first ones
    (NULL: none was added; the caller owns it). The list of attempts begins anew with each round; what they have
    spent adds up, and the budget grows with the solutions. */
-static PetscErrorCode Rounds(Search *s, HycoSamples *grown, HycoTraining *report)
+static PetscErrorCode SearchRounds(Search *s, HycoSamples *grown, HycoTraining *report)
 {
   HycoReducer t = s->t;
   const PetscInt budget = t->budget < 0 ? s->first : t->budget;
@@ -1366,7 +1372,7 @@ static PetscErrorCode Rounds(Search *s, HycoSamples *grown, HycoTraining *report
     const PetscInt left = budget - (report->n_added - report->n_former),
                    n_add = PetscMin(PetscMax(2, s->first / ROUND), left);
 
-    PetscCall(Attempts(s));
+    PetscCall(SearchAttempts(s));
     /* Points are added only for targets: the default limits end with what the user's points give. */
     if (!s->targets || s->least <= 1 || n_add < 1 || !t->scene->n_parameters || IsOwn(t)) break;
     PetscCall(KeepBest(s, report));
@@ -1400,13 +1406,14 @@ static PetscErrorCode JudgeFresh(Search *s, HycoROM model, HycoSamples *former, 
   s->force = HycoHeldOutForce(n, t->judged_held);
   /* Points near added solutions count too: they are a part of the region. */
   *met = (PetscBool)(s->least <= 1);
-  for (PetscInt k = 0; k < n; k++) *met = (PetscBool)(*met && Quotient(s, &t->judged_held[k]) <= 1);
+  for (PetscInt k = 0; k < n; k++) *met = (PetscBool)(*met && SearchQuotient(s, &t->judged_held[k]) <= 1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Builds the best model. If solutions were added near its held-out points, and it misses the targets at fresh ones, or
    missed them at the former, these become training points: *again. */
-static PetscErrorCode Conclude(Search *s, HycoROM *model, HycoSamples *grown, HycoTraining *report, PetscBool *again)
+static PetscErrorCode SearchConclude(Search *s, HycoROM *model, HycoSamples *grown, HycoTraining *report,
+                                     PetscBool *again)
 {
   HycoReducer t = s->t;
   HycoSamples former;
@@ -1440,17 +1447,17 @@ static PetscErrorCode Conclude(Search *s, HycoROM *model, HycoSamples *grown, Hy
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Round(Search *s, HycoROM *model, HycoSamples *grown, HycoTraining *report, PetscBool *again)
+static PetscErrorCode SearchRound(Search *s, HycoROM *model, HycoSamples *grown, HycoTraining *report, PetscBool *again)
 {
   PetscFunctionBegin;
-  PetscCall(Rounds(s, grown, report));
-  PetscCall(Conclude(s, model, grown, report, again));
+  PetscCall(SearchRounds(s, grown, report));
+  PetscCall(SearchConclude(s, model, grown, report, again));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rounds() tries settings and adds solutions until the targets are met; Conclude() builds the best and judges it at
-   fresh points. */
-static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoTraining *report)
+/* SearchRounds() tries settings and adds solutions until the targets are met; SearchConclude() builds the best and
+   judges it at fresh points. */
+static PetscErrorCode SearchAndConclude(Search *s, HycoROM *model, HycoSamples *grown, HycoTraining *report)
 {
   HycoReducer t = s->t;
   PetscReal edge = 0;
@@ -1469,8 +1476,8 @@ static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoT
   PetscCall(HycoReducerGetTargets(t, s->target, s->limit));
   PetscCall(HycoSamplesGet(t->samples, &s->first, NULL, NULL));
   while (again) {
-    HycoCatch(Round(s, model, grown, report, &again), ierr, message);
-    PetscCall(Survive(s, ierr, message, (PetscBool)(s->former != NULL)));
+    HycoCatch(SearchRound(s, model, grown, report, &again), ierr, message);
+    PetscCall(SearchSurvive(s, ierr, message, (PetscBool)(s->former != NULL)));
     if (!ierr) continue;
     PetscCall(TakeBetter(s, model, report));
     again = PETSC_FALSE;
@@ -1489,7 +1496,7 @@ PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *mod
   *grown = NULL;
   t->plane = NULL;
   /* Nothing to search: one build with the settings as they are. */
-  if (Settled(t)) {
+  if (SearchIsSettled(t)) {
     PetscCall(TakeColumns(t, store, HycoReducerOwnModes(t, t->prototype)));
     PetscCall(HycoReducerReduce(t, store, PETSC_FALSE));
     PetscCall(TakeModes(t, store));
@@ -1501,8 +1508,8 @@ PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *mod
   s->t = t;
   s->store = store;
   PetscCall(HycoTrainerNames(&s->types));
-  ierr = Learn(s, model, grown, report);
-  Forget(s);
+  ierr = SearchAndConclude(s, model, grown, report);
+  SearchReset(s);
   /* After an error a model of an earlier attempt may be left. */
   (void)!HycoROMDestroy(&s->kept);
   (void)!SetFormer(s, NULL, NULL);

@@ -33,7 +33,7 @@ static PetscErrorCode MakeFolder(const char folder[])
 
 /* Rank 0 makes the folder before any rank opens a file in it. The fingerprint is of scene and mesh: solutions of
    another one are refused by it. */
-static PetscErrorCode Begin(HycoSnapshots s)
+static PetscErrorCode SnapshotsBegin(HycoSnapshots s)
 {
   PetscFunctionBegin;
   HycoOnRoot(HycoComm(s), MakeFolder(s->folder));
@@ -56,7 +56,7 @@ PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char fold
   s->scene = scene;
   PetscCall(PetscCalloc2(HycoSize(comm), &s->solved, HycoSize(comm), &s->written));
   PetscCall(PetscStrncpy(s->folder, folder, sizeof(s->folder)));
-  HycoOnError(Begin(s), PetscCall(HycoSnapshotsDestroy(&s)));
+  HycoOnError(SnapshotsBegin(s), PetscCall(HycoSnapshotsDestroy(&s)));
   *snapshots = s;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -390,7 +390,7 @@ static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
 }
 
 /* A full-order solution with its outputs, and its processor time on all ranks of the group. */
-static PetscErrorCode Solve(HycoSnapshots s, HycoFOM fom, const PetscReal mu[], HycoSummary *summary)
+static PetscErrorCode SnapshotsSolve(HycoSnapshots s, HycoFOM fom, const PetscReal mu[], HycoSummary *summary)
 {
   PetscFunctionBegin;
   PetscCall(HycoFOMSolve(fom, s->scene->n_parameters, mu));
@@ -414,7 +414,7 @@ static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[]
   PetscFunctionBegin;
   PetscCall(HycoFOMSetStepMonitor(fom, WriteStep, w));
   fom->path->between = WriteBetween;
-  PetscCall(Solve(w->s, fom, mu, &summary));
+  PetscCall(SnapshotsSolve(w->s, fom, mu, &summary));
   PetscCall(HycoFOMGetHistory(fom, &history));
   HycoSceneNamePoint(w->s->scene, mu, at);
   /* Half of a path would train a model that is wrong at the end and does not know it. */
@@ -460,7 +460,7 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
     PetscCall(SolvePath(s, fom, mu, force));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(Solve(s, fom, mu, &summary));
+  PetscCall(SnapshotsSolve(s, fom, mu, &summary));
   /* Full order has added a spring to a body that nothing holds; a reduced stiffness has no such term. */
   HycoCheck(!summary.regularised[0],
             "neither supports nor contact keep %s: full order can be regularised, but a reduced model cannot; fix a "
@@ -480,7 +480,7 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
 
 /* A HycoPath's interrupt, because a path may take hours. Called between steps: raises the error of another group,
    so that this one does not go on for hours. */
-static PetscErrorCode Hear(void *ctx)
+static PetscErrorCode SnapshotsPollErrors(void *ctx)
 {
   PetscFunctionBegin;
   PetscCall(HycoQueueHear((HycoQueue)ctx));
@@ -516,8 +516,8 @@ static PetscErrorCode SolveQueued(HycoSnapshots s, HycoQueue queue, const Missin
   }
 }
 
-/* A group has a full-order model of its own, whose factor it keeps from point to point. A long path looks between its steps
-   whether another group has failed. */
+/* A group has a full-order model of its own, whose factor it keeps from point to point. A long path looks between its
+   steps whether another group has failed. */
 static PetscErrorCode SolveGroup(HycoSnapshots s, HycoQueue queue, const Missing *m)
 {
   MPI_Comm group;
@@ -529,7 +529,7 @@ static PetscErrorCode SolveGroup(HycoSnapshots s, HycoQueue queue, const Missing
   /* On the group's communicator: each group has the whole mesh distributed over its ranks. */
   PetscCall(HycoFOMCreate(group, s->scene, &fom));
   if (fom->path) {
-    fom->path->interrupt = Hear;
+    fom->path->interrupt = SnapshotsPollErrors;
     fom->path->interrupt_ctx = queue;
   }
   PetscCall(PetscMalloc1(fom->fe->n_dof, &force));
@@ -769,7 +769,8 @@ PetscErrorCode HycoSnapshotsHas(HycoSnapshots s, const PetscReal mu[], PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The times of full order's steps, and the estimate of their error; the caller frees them. -1: their number is the file's. */
+/* The times of full order's steps, and the estimate of their error; the caller frees them. -1: their number is the
+   file's. */
 PetscErrorCode HycoSnapshotsReadTaken(HycoSnapshots s, const PetscReal mu[], PetscInt *n, PetscReal **taken,
                                       PetscReal *time_error)
 {

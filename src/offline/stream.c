@@ -12,7 +12,7 @@
 #define LOSS 0.1
 
 /* Number of columns of N rows that fit in memory, over all ranks: the same on any number of them. */
-static PetscInt Room(HycoReducer t, PetscInt N)
+static PetscInt StreamRoom(HycoReducer t, PetscInt N)
 {
   return (PetscInt)PetscMin(1e6 * t->pod_memory / (COPIES * sizeof(PetscReal) * PetscMax(1, (PetscReal)N)), 1e9);
 }
@@ -21,7 +21,7 @@ static PetscInt Room(HycoReducer t, PetscInt N)
 PetscErrorCode HycoReducerEachBatch(HycoReducer t, HycoBatchUse use, void *ctx)
 {
   const PetscInt n_steps = HycoSnapshotsSteps(t->scene), n = t->n_s / n_steps;
-  const PetscInt most = PetscMax(1, Room(t, t->sizes[0] * t->sizes[3]) / n_steps);
+  const PetscInt most = PetscMax(1, StreamRoom(t, t->sizes[0] * t->sizes[3]) / n_steps);
 
   PetscFunctionBegin;
   /* They are in memory: no reading, one batch. */
@@ -75,7 +75,7 @@ static PetscErrorCode CheckRoom(const Stream *s, PetscInt n)
 }
 
 /* Merges *S, a share of all columns, and frees it. */
-static PetscErrorCode Merge(Stream *s, PetscReal share, Mat *S)
+static PetscErrorCode StreamMerge(Stream *s, PetscReal share, Mat *S)
 {
   PetscFunctionBegin;
   /* Losses add up over the batches: each may lose its share. */
@@ -97,7 +97,7 @@ static PetscErrorCode MergePoints(Stream *s, HycoSnapshots store)
     PetscCall(CountModes(s, &l));
     count = PetscMin(s->room - l, n - first);
     PetscCall(HycoReducerReadField(s->t, store, s->kind, first, count, &S));
-    PetscCall(Merge(s, (PetscReal)count / (PetscReal)n, &S));
+    PetscCall(StreamMerge(s, (PetscReal)count / (PetscReal)n, &S));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -136,7 +136,7 @@ static PetscErrorCode MergePaths(Stream *s, HycoSnapshots store, PetscReal tol)
       /* The first pass only finds the largest displacement of all paths. */
       if (pass && modes.V[0]) {
         PetscCall(MatScale(modes.V[0], HycoPathScale(modes.first[0], largest)));
-        PetscCall(Merge(s, 1 / (PetscReal)n, &modes.V[0]));
+        PetscCall(StreamMerge(s, 1 / (PetscReal)n, &modes.V[0]));
       }
       largest = PetscMax(largest, modes.first[0]);
       PetscCall(HycoPathModesDestroy(&modes));
@@ -171,7 +171,7 @@ PetscErrorCode HycoReducerStreamBasis(HycoReducer t, HycoSnapshots store, PetscI
             "-hyco_pod_memory computes PODs by the SVD type %s, and -hyco_pod_svd_type is %s; leave one of the two out",
             HYCO_SVD_TSQR, t->svd_type);
   PetscCall(HycoSnapshotsGetRows(store, t->columns, HycoSeedFields[kind], &s.N));
-  s.room = Room(t, s.N);
+  s.room = StreamRoom(t, s.N);
   PetscCall(HycoReducerCreateSVD(t, HycoComm(t), &s.svd));
   PetscCall(t->scene->n_times ? MergePaths(&s, store, tol) : MergePoints(&s, store));
   PetscCall(EndStream(&s, tol, most));

@@ -18,13 +18,13 @@ PetscErrorCode HycoTrainingReplayCreate(HycoReducer t, PetscErrorCode (*displace
 PetscErrorCode HycoTrainingReplayDestroy(HycoTrainingReplay *r)
 {
   PetscFunctionBegin;
-  PetscCall(HycoMarchEnd(&r->march));
+  PetscCall(HycoTimeLoopEnd(&r->march));
   HycoFreeAll(&r->u, &r->before, &r->after);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* u of training point k at a time, at fe's parameters. Collective. */
-static PetscErrorCode Displace(HycoTrainingReplay *r, PetscInt k, PetscReal time)
+static PetscErrorCode TrainingReplayDisplace(HycoTrainingReplay *r, PetscInt k, PetscReal time)
 {
   const HycoScene scene = r->t->scene;
   const PetscInt n = HycoSnapshotsSteps(scene);
@@ -51,13 +51,14 @@ static PetscErrorCode Displace(HycoTrainingReplay *r, PetscInt k, PetscReal time
 }
 
 /* Integrates the laws from t0 to t1, the time of fe and u. */
-static PetscErrorCode Step(HycoTrainingReplay *r, PetscReal t0, PetscReal t1)
+static PetscErrorCode TrainingReplayStep(HycoTrainingReplay *r, PetscReal t0, PetscReal t1)
 {
   HycoFEStepReport report;
 
   PetscFunctionBegin;
-  if (!r->march.state) PetscCall(HycoMarchBegin(r->fe, &r->march)); /* after fe has been set to the path's first time */
-  PetscCall(HycoMarchStep(&r->march, r->u, t0, t1, &report));
+  if (!r->march.state)
+    PetscCall(HycoTimeLoopBegin(r->fe, &r->march)); /* after fe has been set to the path's first time */
+  PetscCall(HycoTimeLoopStep(&r->march, r->u, t0, t1, &report));
   HycoCheckModel(!report.failed, "the laws cannot be integrated along the training displacements at t = %.10g: %s",
                  (double)t1, report.why);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -65,8 +66,8 @@ static PetscErrorCode Step(HycoTrainingReplay *r, PetscReal t0, PetscReal t1)
 
 /* Integrates the laws at the n times taken[]. The march begins anew for each path; a listed time is one of
    `taken`, to the bit. */
-static PetscErrorCode Follow(HycoTrainingReplay *r, PetscInt k, const PetscReal mu[], PetscInt n,
-                             const PetscReal taken[])
+static PetscErrorCode TrainingReplayIntegrate(HycoTrainingReplay *r, PetscInt k, const PetscReal mu[], PetscInt n,
+                                              const PetscReal taken[])
 {
   const HycoScene scene = r->t->scene;
   const PetscInt steps = HycoSnapshotsSteps(scene);
@@ -75,13 +76,13 @@ static PetscErrorCode Follow(HycoTrainingReplay *r, PetscInt k, const PetscReal 
 
   PetscFunctionBegin;
   /* States of the former path. */
-  PetscCall(HycoMarchEnd(&r->march));
+  PetscCall(HycoTimeLoopEnd(&r->march));
   for (PetscInt i = 0; i < n; i++) {
     HycoSceneSetTime(scene, mu, taken[i], all);
     PetscCall(HycoFOMSetParameters(r->t->fom, all));
-    PetscCall(Displace(r, k, taken[i]));
+    PetscCall(TrainingReplayDisplace(r, k, taken[i]));
     /* A law without a solution on one rank ends the replay on all. */
-    HycoOnEach(HycoComm(r->t), Step(r, taken[PetscMax(i - 1, 0)], taken[i]));
+    HycoOnEach(HycoComm(r->t), TrainingReplayStep(r, taken[PetscMax(i - 1, 0)], taken[i]));
     if (!scene->n_times || (step < scene->n_times && taken[i] == scene->times[step]))
       PetscCall((*r->record)(r->ctx, k * steps + step++));
   }
@@ -103,6 +104,6 @@ PetscErrorCode HycoTrainingReplayFollow(HycoTrainingReplay *r, HycoSnapshots sto
   /* Without a history one time, 0, at which the laws are linear. */
   else
     PetscCall(PetscCalloc1(1, &taken));
-  HycoFinally(Follow(r, k, mu + k * n_par, n, taken), PetscCall(PetscFree(taken)));
+  HycoFinally(TrainingReplayIntegrate(r, k, mu + k * n_par, n, taken), PetscCall(PetscFree(taken)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -16,7 +16,7 @@ static PetscInt FromGmsh(HycoCellType type, PetscInt k)
 
 /* The nodes of the cells (n_cells x nv) in the whole mesh. The caller frees them. With an order, numbers of the
    whole mesh, else those of the part. */
-static PetscErrorCode Nodes(const HycoFileOrder *order, HycoMesh m, PetscBool vtk, PetscInt **cells)
+static PetscErrorCode CellsNodes(const HycoFileOrder *order, HycoMesh m, PetscBool vtk, PetscInt **cells)
 {
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(m->n_cells * m->nv, cells));
@@ -35,7 +35,7 @@ PetscErrorCode HycoFieldsWriteCells(HycoH5 h, const char name[], const HycoFileO
   PetscInt *cells;
 
   PetscFunctionBegin;
-  PetscCall(Nodes(order, m, vtk, &cells));
+  PetscCall(CellsNodes(order, m, vtk, &cells));
   PetscCall(HycoFieldWrite(h, order, m->n_cells, name, HYCO_ON_CELLS, MPIU_INT, m->nv, m->nv, cells));
   PetscCall(PetscFree(cells));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -75,7 +75,7 @@ PetscErrorCode HycoCellListCreate(const HycoFileOrder *order, HycoMesh m, const 
 
   PetscFunctionBegin;
   PetscCall(PetscMemzero(l, sizeof(*l)));
-  PetscCall(Nodes(order, m, PETSC_TRUE, &cells));
+  PetscCall(CellsNodes(order, m, PETSC_TRUE, &cells));
   PetscCall(HycoFieldRows(order, m->n_cells, HYCO_ON_CELLS, MPIU_INT, m->nv, cells, &rows));
   PetscCall(ListRows(m, code, order ? order->n[HYCO_ON_CELLS] : m->n_cells, (const PetscInt *)rows, l));
   if (rows != cells) PetscCall(PetscFree(rows));

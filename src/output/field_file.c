@@ -28,7 +28,7 @@ static const unsigned char code[HYCO_N_CELL_TYPES] = {
     [HYCO_TRI3] = 4, [HYCO_QUAD4] = 5, [HYCO_TET4] = 6, [HYCO_PYRAMID5] = 7, [HYCO_PRISM6] = 8, [HYCO_HEX8] = 9};
 
 /* The length of the ending .vtkhdf or .xdmf of a path; 0: another ending. */
-static size_t Ending(const char path[])
+static size_t FieldFileEnding(const char path[])
 {
   const size_t n = strlen(path);
 
@@ -39,7 +39,7 @@ static size_t Ending(const char path[])
 /* The margin of 16 is for endings that are added to it. */
 PetscErrorCode HycoFieldsNumbers(const char path[], char numbers[PETSC_MAX_PATH_LEN])
 {
-  const size_t ending = Ending(path);
+  const size_t ending = FieldFileEnding(path);
 
   PetscFunctionBegin;
   HycoCheck(
@@ -87,7 +87,7 @@ PetscErrorCode HycoFieldFileCreate(MPI_Comm comm, const char path[], PetscInt mo
   f->comm = comm;
   f->most = most;
   f->points = points;
-  f->vtk = (PetscBool)(Ending(path) == 7);
+  f->vtk = (PetscBool)(FieldFileEnding(path) == 7);
   PetscCall(PetscStrncpy(f->path, path, sizeof(f->path)));
   PetscCall(HycoFieldsNumbers(path, f->h5_path));
   /* Times arrive one by one; none is allocated while fields are written. */
@@ -190,7 +190,7 @@ static PetscErrorCode NameContacts(HycoFieldFile f, const char set[])
 
 /* Writes the unit of a field, as given in the scene, and the names of its components, to an existing dataset. On one
    process. Units are the scene's text; without them only the components are described. */
-static PetscErrorCode Describe(HycoFieldFile f, const char set[], const HycoField *field)
+static PetscErrorCode FieldFileDescribe(HycoFieldFile f, const char set[], const HycoField *field)
 {
   static const char *const lengths[] = {"displacement", "gap", "contact_slip", NULL},
                            *const forces[] = {"contact_force", NULL},
@@ -240,7 +240,7 @@ PetscErrorCode HycoFieldFileAddRows(HycoFieldFile f, const HycoField *field, con
     NameSet(f, f->n, field, set);
     PetscCall(HycoH5WriteRows(f->h, set, MPIU_REAL, all, field->components, first, own, rows));
   }
-  HycoOnRoot(f->comm, Describe(f, set, field));
+  HycoOnRoot(f->comm, FieldFileDescribe(f, set, field));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -302,7 +302,7 @@ PetscErrorCode HycoFieldFileEndTime(HycoFieldFile f)
 /* ------------------------------------------------------------------------------------------ XDMF */
 
 /* Escapes a name for XML. */
-static void Escape(const char name[], char out[6 * PETSC_MAX_PATH_LEN])
+static void FieldFileEscape(const char name[], char out[6 * PETSC_MAX_PATH_LEN])
 {
   static const char special[] = "&<>\"'";
   static const char *const entity[] = {"&amp;", "&lt;", "&gt;", "&quot;", "&apos;"};
@@ -373,7 +373,7 @@ static PetscErrorCode WriteText(HycoFieldFile f, HycoFile *out)
   FILE *text;
 
   PetscFunctionBegin;
-  Escape(slash ? slash + 1 : f->h5_path, h5);
+  FieldFileEscape(slash ? slash + 1 : f->h5_path, h5);
   PetscCall(HycoFileCreate(f->path, HYCO_FILE_TEXT, out));
   text = HycoFileStream(*out);
   fprintf(text, "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n <Domain>\n");
@@ -418,7 +418,7 @@ static PetscErrorCode WriteParameters(HycoFieldFile f)
 }
 
 /* Renames the files, the numbers first: otherwise the .xdmf could refer to no numbers, or to those of another run. */
-static PetscErrorCode Place(HycoFieldFile f, HycoFile *out)
+static PetscErrorCode FieldFileRename(HycoFieldFile f, HycoFile *out)
 {
   PetscErrorCode ierr = 0;
 
@@ -440,7 +440,7 @@ static PetscErrorCode Place(HycoFieldFile f, HycoFile *out)
 PetscErrorCode HycoFieldFileCommit(HycoFieldFile f)
 {
   HycoFile out = NULL;
-  PetscErrorCode ierr = Place(f, &out);
+  PetscErrorCode ierr = FieldFileRename(f, &out);
 
   PetscFunctionBegin;
   if (out) PetscCall(HycoFileClose(&out, PETSC_FALSE));

@@ -162,8 +162,8 @@ static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What friction adds at the slaves of this process's contacts; for a node in several contacts sums, and the state that is
-   nearest to slip. */
+/* What friction adds at the slaves of this process's contacts; for a node in several contacts sums, and the state that
+   is nearest to slip. */
 static PetscErrorCode FillFriction(HycoFE fe, const HycoPairs *pairs, HycoContactFields *f)
 {
   const HycoShear *shear = pairs->shear;
@@ -192,7 +192,7 @@ PetscErrorCode HycoContactFieldsCreate(MPI_Comm comm, HycoFE surface, HycoPairs 
   const PetscInt n = surface->mesh->n_nodes;
 
   PetscFunctionBegin;
-  f->rubs = (PetscBool)(pairs->shear != NULL);
+  f->has_friction = (PetscBool)(pairs->shear != NULL);
   f->traction = f->slip = f->state = NULL;
   /* Zero at nodes without contact; gap and contact's number are then set to not a number. */
   PetscCall(PetscCalloc4(3 * n, &f->force, n, &f->pressure, n, &f->gap_node, n, &f->which));
@@ -213,8 +213,8 @@ PetscErrorCode HycoContactFieldsCreate(MPI_Comm comm, HycoFE surface, HycoPairs 
 /* Combines values, `width` at each node of a surface, over the ranks, from `start` on, at the nodes of each rank's
    part: one component at a time, as PETSc's star forests add up no vectors. to_owner: from the surface's nodes to
    the owners of the part's; to_part: from there to all copies in parts. */
-static PetscErrorCode Combine(PetscSF to_owner, PetscSF to_part, HycoMesh part, PetscInt n, PetscInt width, MPI_Op op,
-                              PetscReal start, const PetscReal value[], PetscReal at_part[])
+static PetscErrorCode FieldsCombine(PetscSF to_owner, PetscSF to_part, HycoMesh part, PetscInt n, PetscInt width,
+                                    MPI_Op op, PetscReal start, const PetscReal value[], PetscReal at_part[])
 {
   PetscReal *owned, *one, *mine;
 
@@ -243,7 +243,7 @@ static PetscErrorCode CombineLeast(PetscSF to_owner, PetscSF to_part, HycoMesh p
     /* In place: the caller's array is replaced by the part's right afterwards. */
     if (!(PetscAbsReal(value[i]) < PETSC_MAX_REAL)) value[i] = PETSC_MAX_REAL;
   }
-  PetscCall(Combine(to_owner, to_part, part, n, 1, MPI_MIN, PETSC_MAX_REAL, value, at_part));
+  PetscCall(FieldsCombine(to_owner, to_part, part, n, 1, MPI_MIN, PETSC_MAX_REAL, value, at_part));
   for (PetscInt i = 0; i < part->n_nodes; i++) {
     if (at_part[i] >= PETSC_MAX_REAL) at_part[i] = NAN;
   }
@@ -258,9 +258,9 @@ static PetscErrorCode FrictionToPart(PetscSF to_owner, PetscSF to_part, HycoMesh
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(3 * part->n_nodes, &traction, 3 * part->n_nodes, &slip, part->n_nodes, &state));
-  PetscCall(Combine(to_owner, to_part, part, n, 3, MPI_SUM, 0, f->traction, traction));
-  PetscCall(Combine(to_owner, to_part, part, n, 3, MPI_SUM, 0, f->slip, slip));
-  PetscCall(Combine(to_owner, to_part, part, n, 1, MPI_MAX, 0, f->state, state));
+  PetscCall(FieldsCombine(to_owner, to_part, part, n, 3, MPI_SUM, 0, f->traction, traction));
+  PetscCall(FieldsCombine(to_owner, to_part, part, n, 3, MPI_SUM, 0, f->slip, slip));
+  PetscCall(FieldsCombine(to_owner, to_part, part, n, 1, MPI_MAX, 0, f->state, state));
   PetscCall(PetscFree3(f->traction, f->slip, f->state));
   f->traction = traction;
   f->slip = slip;
@@ -280,11 +280,11 @@ static PetscErrorCode ToPart(MPI_Comm comm, HycoMesh part, HycoMesh surface, Hyc
   PetscCall(HycoMeshNodeSF(comm, part, surface->n_nodes, surface->node_global, &to_owner));
   PetscCall(HycoMeshNodeSF(comm, part, part->n_nodes, part->node_global, &to_part));
   /* Forces add up: each contact's is counted on one rank only. Pressures and gaps do not: largest and smallest. */
-  PetscCall(Combine(to_owner, to_part, part, surface->n_nodes, 3, MPI_SUM, 0, f->force, force));
-  PetscCall(Combine(to_owner, to_part, part, surface->n_nodes, 1, MPI_MAX, 0, f->pressure, pressure));
+  PetscCall(FieldsCombine(to_owner, to_part, part, surface->n_nodes, 3, MPI_SUM, 0, f->force, force));
+  PetscCall(FieldsCombine(to_owner, to_part, part, surface->n_nodes, 1, MPI_MAX, 0, f->pressure, pressure));
   PetscCall(CombineLeast(to_owner, to_part, part, surface->n_nodes, f->gap_node, gap));
   PetscCall(CombineLeast(to_owner, to_part, part, surface->n_nodes, f->which, which));
-  if (f->rubs) PetscCall(FrictionToPart(to_owner, to_part, part, surface->n_nodes, f));
+  if (f->has_friction) PetscCall(FrictionToPart(to_owner, to_part, part, surface->n_nodes, f));
   HycoDestroyAll(&to_owner, &to_part);
   PetscCall(PetscFree4(f->force, f->pressure, f->gap_node, f->which));
   f->force = force;
@@ -469,7 +469,7 @@ static PetscErrorCode AddFields(HycoFieldFile file, const HycoSolution *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Write(HycoFieldFile file, const HycoSolution *s)
+static PetscErrorCode FieldsWrite(HycoFieldFile file, const HycoSolution *s)
 {
   PetscFunctionBegin;
   PetscCall(HycoFieldFileOpen(file, s->order, s->fe->mesh, s->fe->scene, s->fe->X, s->fe->mu));
@@ -485,7 +485,7 @@ PetscErrorCode HycoSolutionWrite(const char path[], const HycoSolution *s)
 
   PetscFunctionBegin;
   PetscCall(HycoFieldFileCreate(s->order ? s->order->comm : PETSC_COMM_SELF, path, 0, PETSC_FALSE, &file));
-  HycoFinally(Write(file, s), PetscCall(HycoFieldFileDestroy(&file)));
+  HycoFinally(FieldsWrite(file, s), PetscCall(HycoFieldFileDestroy(&file)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -182,8 +182,8 @@ static PetscErrorCode AwayFromZ(HycoFE fe, PetscInt cell, PetscReal out[2])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The field of a stress s (6: xx, yy, zz, xy, yz, xz); n: the direction from the z axis, for r and t about it in 2D and 3D;
-   in an axisymmetric scene they are about its axis. A cell around the z axis has the mean over the directions. */
+/* The field of a stress s (6: xx, yy, zz, xy, yz, xz); n: the direction from the z axis, for r and t about it in 2D and
+   3D; in an axisymmetric scene they are about its axis. A cell around the z axis has the mean over the directions. */
 static PetscErrorCode OfStress(HycoFE fe, PetscInt field, const PetscReal s[6], const PetscReal n[2], PetscReal *value)
 {
   PetscReal mises, principal[3];
@@ -236,8 +236,8 @@ static PetscErrorCode OfCell(HycoFE fe, PetscInt field, const PetscReal sigma[],
 #define BESIDE 1e-5 /* step of differences by a stress, of its largest component */
 
 /* slope += factor times the derivative of the field in a cell. */
-static PetscErrorCode AddCellSlope(HycoFE fe, PetscInt field, const PetscReal sigma[], PetscInt cell, PetscReal factor,
-                                   PetscReal slope[])
+static PetscErrorCode AddCellDerivative(HycoFE fe, PetscInt field, const PetscReal sigma[], PetscInt cell,
+                                        PetscReal factor, PetscReal slope[])
 {
   PetscReal s[6], n[2], by[6] = {0}, most = 0;
 
@@ -256,13 +256,13 @@ static PetscErrorCode AddCellSlope(HycoFE fe, PetscInt field, const PetscReal si
     s[k] = at;
     by[k] = (value[1] - value[0]) / (2 * step);
   }
-  PetscCall(HycoFEAddStressSlope(fe, cell, by, factor, slope));
+  PetscCall(HycoFEAddStressDerivatives(fe, cell, by, factor, slope));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The same of OfNode(). */
-static void AddNodeSlope(HycoFE fe, PetscInt field, const PetscReal u[], PetscInt node, PetscReal factor,
-                         PetscReal slope[])
+static void AddNodeDerivative(HycoFE fe, PetscInt field, const PetscReal u[], PetscInt node, PetscReal factor,
+                              PetscReal slope[])
 {
   const PetscReal length = field == U ? OfNode(fe, U, u, node) : 0;
 
@@ -353,7 +353,7 @@ PetscErrorCode HycoQuantitiesMarkDecisive(HycoFE fe, const PetscReal u[], const 
 }
 
 /* Over all processes' copies: extremes need no owner. */
-static void Extend(Sum *s, PetscReal value)
+static void QuantitiesExtend(Sum *s, PetscReal value)
 {
   s->most = PetscMax(s->most, value);
   s->least = PetscMin(s->least, value);
@@ -372,10 +372,10 @@ static PetscErrorCode AddEntity(HycoFE fe, const HycoQuantity *quantity, const P
   PetscReal at[HYCO_CELL_NODES], of[HYCO_CELL_NODES] = {0}, all = 0;
 
   PetscFunctionBegin;
-  if (value) Extend(s, *value);
+  if (value) QuantitiesExtend(s, *value);
   for (PetscInt a = 0; a < el->nv && !value; a++) {
     at[a] = OfNode(fe, field, u, node[a]);
-    Extend(s, at[a]);
+    QuantitiesExtend(s, at[a]);
   }
   if (HycoMeshOwned(m, node[0]) < 0) PetscFunctionReturn(PETSC_SUCCESS); /* added by another process */
   s->weight += quantity->kind != HYCO_QUANTITY_MEAN;
@@ -395,8 +395,8 @@ static PetscErrorCode AddEntity(HycoFE fe, const HycoQuantity *quantity, const P
     all += w;
     for (PetscInt a = 0; a < el->nv && s->slope; a++) of[a] += w * el->N[q][a];
   }
-  if (s->slope && value) PetscCall(AddCellSlope(fe, field, sigma, cell, all, s->slope));
-  for (PetscInt a = 0; a < el->nv && s->slope && !value; a++) AddNodeSlope(fe, field, u, node[a], of[a], s->slope);
+  if (s->slope && value) PetscCall(AddCellDerivative(fe, field, sigma, cell, all, s->slope));
+  for (PetscInt a = 0; a < el->nv && s->slope && !value; a++) AddNodeDerivative(fe, field, u, node[a], of[a], s->slope);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -412,12 +412,12 @@ static PetscErrorCode AddNodes(HycoFE fe, const HycoQuantity *q, const PetscReal
   for (PetscInt k = m->group_start[p->group]; field < XX && k < m->group_start[p->group + 1]; k++) {
     const PetscReal value = OfNode(fe, field, u, m->group_node[k]);
 
-    Extend(s, value);
+    QuantitiesExtend(s, value);
     /* Extremes may see a node twice, sums may not. */
     if (HycoMeshOwned(m, m->group_node[k]) < 0) continue;
     s->sum += value;
     s->weight += 1;
-    if (s->slope) AddNodeSlope(fe, field, u, m->group_node[k], 1, s->slope);
+    if (s->slope) AddNodeDerivative(fe, field, u, m->group_node[k], 1, s->slope);
   }
   if (field < XX) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscCalloc1(m->n_cells, &in));
@@ -514,9 +514,10 @@ static PetscErrorCode AddContacts(HycoFE fe, PetscInt i, const HycoContactResult
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A group of points or lines is evaluated at its nodes, one of cells or facets by entity. Stresses on a facet are those of
-   its cell. */
-static PetscErrorCode Measure(HycoFE fe, const HycoQuantity *q, const PetscReal u[], const PetscReal sigma[], Sum *s)
+/* A group of points or lines is evaluated at its nodes, one of cells or facets by entity. Stresses on a facet are those
+   of its cell. */
+static PetscErrorCode QuantitiesMeasure(HycoFE fe, const HycoQuantity *q, const PetscReal u[], const PetscReal sigma[],
+                                        Sum *s)
 {
   HycoMesh m = fe->mesh;
   PetscBool *in;
@@ -557,7 +558,7 @@ static PetscErrorCode MeasureBodies(MPI_Comm comm, HycoFE fe, const HycoQuantity
   PetscReal ends[2], sums[2];
 
   PetscFunctionBegin;
-  HycoOnEach(comm, is_reaction ? AddReactions(fe, q, reaction, &s) : Measure(fe, q, u, sigma, &s));
+  HycoOnEach(comm, is_reaction ? AddReactions(fe, q, reaction, &s) : QuantitiesMeasure(fe, q, u, sigma, &s));
   ends[0] = s.most;
   ends[1] = -s.least;
   sums[0] = s.sum;
@@ -576,14 +577,14 @@ static PetscErrorCode MeasureBodies(MPI_Comm comm, HycoFE fe, const HycoQuantity
 }
 
 /* The same cells, facets or nodes as in the mean. */
-PetscErrorCode HycoQuantityMeanSlope(HycoFE fe, PetscInt k, const PetscReal u[], const PetscReal sigma[],
-                                     PetscReal slope[])
+PetscErrorCode HycoQuantityMeanDerivative(HycoFE fe, PetscInt k, const PetscReal u[], const PetscReal sigma[],
+                                          PetscReal slope[])
 {
   Sum s = {.most = -PETSC_INFINITY, .least = PETSC_INFINITY, .slope = slope};
 
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(slope, fe->n_dof));
-  PetscCall(Measure(fe, &fe->scene->quantity[k], u, sigma, &s));
+  PetscCall(QuantitiesMeasure(fe, &fe->scene->quantity[k], u, sigma, &s));
   for (PetscInt i = 0; i < fe->n_dof; i++) slope[i] /= s.weight;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -123,7 +123,7 @@ PetscErrorCode HycoVTKWritePoints(HycoFieldFile f, const PetscReal X[])
 }
 
 /* VTK's order of a symmetric tensor is xx, yy, zz, xy, yz, xz. */
-static void Permute(PetscInt n, const PetscReal tensor[], PetscReal out[])
+static void VtkhdfPermute(PetscInt n, const PetscReal tensor[], PetscReal out[])
 {
   static const PetscInt from[6] = {0, 3, 5, 1, 4, 2};
 
@@ -143,7 +143,7 @@ PetscErrorCode HycoVTKWriteField(HycoFieldFile f, const HycoField *field, const 
   /* VTK orders a symmetric tensor xx yy zz xy yz xz, XDMF row by row. */
   if (field->components == 6) {
     PetscCall(PetscMalloc1(6 * n, &tensor));
-    Permute(n, rows, tensor);
+    VtkhdfPermute(n, rows, tensor);
     rows = tensor;
   }
   HycoFinally(WriteRows(f, set, field->place, field->components == 1 ? HYCO_H5_LINE : field->components, rows),

@@ -9,8 +9,8 @@
 static PetscBool began_petsc = PETSC_FALSE, handles = PETSC_FALSE;
 
 /* The line of an error: hyco's own message, or PETSc's with its location. */
-static void Compose(char said[HYCO_LINE], int line, const char function[], const char file[], PetscErrorCode code,
-                    const char message[])
+static void ErrorsCompose(char said[HYCO_LINE], int line, const char function[], const char file[], PetscErrorCode code,
+                          const char message[])
 {
   /* Codes of messages that are written for the user; others need PETSc's location. */
   const PetscBool own = (PetscBool)(code == PETSC_ERR_USER || code == PETSC_ERR_ORDER || code > PETSC_ERR_MAX_VALUE ||
@@ -27,13 +27,13 @@ static void Compose(char said[HYCO_LINE], int line, const char function[], const
 }
 
 /* Prints it on rank 0 of the object with the error. */
-static void Tell(MPI_Comm comm, int line, const char function[], const char file[], PetscErrorCode code,
-                 const char message[])
+static void ErrorsPrint(MPI_Comm comm, int line, const char function[], const char file[], PetscErrorCode code,
+                        const char message[])
 {
   char said[HYCO_LINE];
 
   if (HycoRank(comm)) return;
-  Compose(said, line, function, file, code, message);
+  ErrorsCompose(said, line, function, file, code, message);
   fprintf(stderr, "hyco: error: %s\n", said);
   fflush(stderr);
 }
@@ -43,12 +43,12 @@ static char kept[HYCO_LINE];
 static char kept_kind;
 
 /* Only the first error of a chain has the message: the others are the callers' lines of the trace. */
-static PetscErrorCode Keep(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
-                           PetscErrorType type, const char *text, void *ctx)
+static PetscErrorCode ErrorsKeepFirst(MPI_Comm comm, int line, const char *function, const char *file,
+                                      PetscErrorCode code, PetscErrorType type, const char *text, void *ctx)
 {
   (void)comm, (void)ctx;
   if (type != PETSC_ERROR_INITIAL) return code;
-  Compose(kept, line, function, file, code, text);
+  ErrorsCompose(kept, line, function, file, code, text);
   kept_kind = code == HYCO_ERR_VALUE ? 'v' : code == HYCO_ERR_NO_FILE ? 'f' : 0;
   return code;
 }
@@ -57,7 +57,7 @@ static PetscErrorCode Keep(MPI_Comm comm, int line, const char *function, const 
 PetscErrorCode HycoKeepErrors(PetscBool keep)
 {
   kept[0] = kept_kind = '\0';
-  return keep ? PetscPushErrorHandler(Keep, NULL) : PetscPopErrorHandler();
+  return keep ? PetscPushErrorHandler(ErrorsKeepFirst, NULL) : PetscPopErrorHandler();
 }
 
 const char *HycoKeptError(void)
@@ -76,7 +76,7 @@ static PetscErrorCode OneLine(MPI_Comm comm, int line, const char *function, con
                               PetscErrorType type, const char *text, void *ctx)
 {
   (void)ctx;
-  if (type == PETSC_ERROR_INITIAL) Tell(comm, line, function, file, code, text);
+  if (type == PETSC_ERROR_INITIAL) ErrorsPrint(comm, line, function, file, code, text);
   if (HycoSize(PETSC_COMM_WORLD) == 1 && function && strcmp(function, "main") == 0) {
     fflush(NULL);
     _exit(1);

@@ -28,7 +28,8 @@ static const HycoMember summary[] = {
   F(lambda_max), F(lambda_norm2), F(u_norm2), F(u_min), F(u_max), F(u_relative), F(quantity), F(n_facing), F(overlap),
   F(sliding), F(strain_energy), F(external_work), F(gap_work), F(energy_defect), F(kkt.stationarity),
   F(kkt.penetration), F(kkt.adhesion), F(kkt.complementarity), F(kkt.rounding), F(reason), F(seconds.setup),
-  F(seconds.assemble), F(seconds.factor), F(seconds.solve), F(seconds.total), F(seconds.cpu), F(loose), F(regularised), F(buried), F(why)};
+  F(seconds.assemble), F(seconds.factor), F(seconds.solve), F(seconds.total), F(seconds.cpu), F(loose),
+  F(regularised), F(buried), F(why)};
 #undef F
 
 #define F(member) FIELD(HycoStep, member)
@@ -79,7 +80,8 @@ static const HycoMember gradient[] = {
 
 #define F(member) FIELD(HycoFit, member)
 static const HycoMember fit[] = {
-  F(misfit), F(scale), F(converged), F(kink), F(evaluations), F(n_starts), F(n_least), F(n_free), F(n_determined), F(method)};
+  F(misfit), F(scale), F(converged), F(kink), F(evaluations), F(n_starts), F(n_least), F(n_free), F(n_determined),
+  F(method)};
 #undef F
 
 #define F(member) FIELD(HycoTraining, member)

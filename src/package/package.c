@@ -14,7 +14,7 @@
 static PetscBool initialized = PETSC_FALSE;
 
 /* PETSc assigns class ids anew after PetscFinalize(). */
-static PetscErrorCode Forget(void)
+static PetscErrorCode PackageReset(void)
 {
   PetscFunctionBegin;
   PetscCall(HycoClassesForget());
@@ -67,7 +67,7 @@ PetscErrorCode HycoInitializePackage(void)
   if (initialized) PetscFunctionReturn(PETSC_SUCCESS);
   initialized = PETSC_TRUE;
   PetscCall(HycoClassesRegister());
-  PetscCall(PetscRegisterFinalize(Forget));
+  PetscCall(PetscRegisterFinalize(PackageReset));
   PetscCall(HycoTaoRegisterAll());
   PetscCall(HycoConeRegister(HYCO_CONE_NONNEGATIVE, HycoConeCreate_Nonnegative));
   PetscCall(HycoConeRegister(HYCO_CONE_COULOMB, HycoConeCreate_Coulomb));

@@ -86,8 +86,8 @@ static PetscErrorCode AddVariable(HycoScene s, const char key[], const char name
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A table is a variable of expressions, of the name after history_tables_. It is counted before its rows are read, so that
-   an error in them leaves a scene that can be destroyed. */
+/* A table is a variable of expressions, of the name after history_tables_. It is counted before its rows are read, so
+   that an error in them leaves a scene that can be destroyed. */
 static PetscErrorCode ReadTable(HycoScene s, const char key[], const char text[])
 {
   const char *name = key + strlen(TABLES);

@@ -36,16 +36,16 @@ static void FindAxes(PetscInt n_par, const PetscReal lo[], const PetscReal hi[],
 }
 
 /* The number of corners of dim dimensions. */
-static PetscInt Corners(PetscInt dim)
+static PetscInt HoldoutCorners(PetscInt dim)
 {
   return (PetscInt)1 << PetscMin(dim, MOST);
 }
 
 /* Corner k of dim dimensions, a bit for each, in an order that spreads them: each even one is followed by its
    opposite. */
-static PetscInt Corner(PetscInt dim, PetscInt k)
+static PetscInt HoldoutCorner(PetscInt dim, PetscInt k)
 {
-  const PetscInt half = PetscMax(Corners(dim) / 2, 1), step = (PetscInt)(0.618 * (PetscReal)half) | 1,
+  const PetscInt half = PetscMax(HoldoutCorners(dim) / 2, 1), step = (PetscInt)(0.618 * (PetscReal)half) | 1,
                  pair = k / 2 * step % half;
 
   return k % 2 ? 2 * half - 1 - pair : pair;
@@ -55,7 +55,7 @@ static PetscInt Corner(PetscInt dim, PetscInt k)
 static void PutAtCorner(const Axes *axes, PetscInt from, PetscInt to, PetscInt k, const PetscReal lo[],
                         const PetscReal hi[], PetscReal point[])
 {
-  const PetscInt bits = Corner(to - from, k % Corners(to - from));
+  const PetscInt bits = HoldoutCorner(to - from, k % HoldoutCorners(to - from));
 
   for (PetscInt j = from; j < to; j++) {
     const PetscInt p = axes->of[j];
@@ -95,7 +95,7 @@ PetscErrorCode HycoSamplesAddScattered(HycoSamples samples, PetscInt count)
     /* On a single axis a face is a corner. */
     const PetscBool face = (PetscBool)(place == FACE && axes.n > 1),
                     corner = (PetscBool)((place == CORNER || (place == AGAIN && axes.n <= FEW)) &&
-                                         n_corners < Corners(axes.n));
+                                         n_corners < HoldoutCorners(axes.n));
     /* Each face has its own part of the sequence, else points on neighbouring faces would be projections of each
        other. */
     const PetscInt faces = 2 * axes.n, number = face ? n_faces / faces + n_faces % faces * BETWEEN : n_inside;
@@ -140,7 +140,7 @@ PetscErrorCode HycoSamplesReach(HycoScene s, PetscInt n, const PetscReal mu[], P
 
 /* The root of x^(dim + 1) = x + 1 that is greater than 1. The iteration contracts: 60 steps reach round-off for
    any dimension. */
-static PetscReal Ratio(PetscInt dim)
+static PetscReal HoldoutRatio(PetscInt dim)
 {
   PetscReal x = 2;
 
@@ -149,15 +149,16 @@ static PetscReal Ratio(PetscInt dim)
 }
 
 /* Coordinate j of point k, in dim dimensions. */
-static PetscReal Coordinate(PetscInt dim, PetscInt j, PetscInt k)
+static PetscReal HoldoutCoordinate(PetscInt dim, PetscInt j, PetscInt k)
 {
-  const PetscReal x = 0.5 + (PetscReal)k * PetscPowReal(Ratio(dim), -(PetscReal)(j + 1));
+  const PetscReal x = 0.5 + (PetscReal)k * PetscPowReal(HoldoutRatio(dim), -(PetscReal)(j + 1));
 
   return x - PetscFloorReal(x);
 }
 
 /* Exactly equal: training points and those of a repeated run are the same numbers. */
-static PetscErrorCode Has(PetscInt n, PetscInt n_par, const PetscReal mu[], const PetscReal point[], PetscBool *has)
+static PetscErrorCode HoldoutContains(PetscInt n, PetscInt n_par, const PetscReal mu[], const PetscReal point[],
+                                      PetscBool *has)
 {
   PetscFunctionBegin;
   *has = PETSC_FALSE;
@@ -183,8 +184,8 @@ static PetscErrorCode IsTaken(const Drawing *d, const PetscReal point[], PetscBo
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(d->seen, &n, NULL, &mu));
   PetscCall(HycoSamplesGet(d->drawn, &m, NULL, &nu));
-  PetscCall(Has(n, d->n_par, mu, point, taken));
-  if (!*taken) PetscCall(Has(m, d->n_par, nu, point, taken));
+  PetscCall(HoldoutContains(n, d->n_par, mu, point, taken));
+  if (!*taken) PetscCall(HoldoutContains(m, d->n_par, nu, point, taken));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -196,7 +197,7 @@ static PetscErrorCode SeekCorner(const Drawing *d, PetscReal point[], PetscBool 
   PetscBool taken = PETSC_TRUE;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < Corners(axes->n - axes->n_lead) && taken; k++) {
+  for (PetscInt k = 0; k < HoldoutCorners(axes->n - axes->n_lead) && taken; k++) {
     /* The leading axes, which the group shares, keep the values that point[] has. */
     PutAtCorner(axes, axes->n_lead, axes->n, k, d->lo, d->hi, point);
     PetscCall(IsTaken(d, point, &taken));
@@ -209,7 +210,7 @@ static PetscErrorCode SeekCorner(const Drawing *d, PetscReal point[], PetscBool 
    training and earlier draws have all of them. */
 static PetscErrorCode SeekGroupCorner(Drawing *d, PetscInt first)
 {
-  const PetscInt n = Corners(d->axes.n_lead);
+  const PetscInt n = HoldoutCorners(d->axes.n_lead);
   PetscReal point[HYCO_MAX_PARAMETERS];
   PetscBool found = PETSC_FALSE;
 
@@ -227,7 +228,7 @@ static PetscErrorCode SeekGroupCorner(Drawing *d, PetscInt first)
 }
 
 /* Point k of the sequence inside the part for its place, after `turn` points that were taken. */
-static void Recur(const Drawing *d, PetscInt k, PetscInt turn, PetscReal point[])
+static void HoldoutRecur(const Drawing *d, PetscInt k, PetscInt turn, PetscReal point[])
 {
   const PetscInt group = k / d->together, place = group % N_PLACES, round = group / N_PLACES, faces = 2 * d->axes.n;
   const PetscInt number = place == INSIDE   ? 2 * round
@@ -241,12 +242,12 @@ static void Recur(const Drawing *d, PetscInt k, PetscInt turn, PetscReal point[]
     /* Within a group the shared axes stay: they cost a factor. */
     const PetscInt later = j < d->axes.n_lead && d->axes.n_lead < d->axes.n ? 0 : 3 * turn * BETWEEN;
 
-    point[p] = HycoSceneBetween(d->scene, p, d->lo[p], d->hi[p], Coordinate(d->n_par, p, 1 + n + later));
+    point[p] = HycoSceneBetween(d->scene, p, d->lo[p], d->hi[p], HoldoutCoordinate(d->n_par, p, 1 + n + later));
   }
 }
 
 /* Draws point k. */
-static PetscErrorCode Draw(const Drawing *d, PetscInt k, PetscReal point[])
+static PetscErrorCode HoldoutDraw(const Drawing *d, PetscInt k, PetscReal point[])
 {
   const PetscInt group = k / d->together, place = group % N_PLACES;
   const PetscBool corner = (PetscBool)(place == CORNER && d->corner >= 0),
@@ -258,14 +259,14 @@ static PetscErrorCode Draw(const Drawing *d, PetscInt k, PetscReal point[])
   if (corner) {
     PetscBool found;
 
-    Recur(d, k, 0, point);
+    HoldoutRecur(d, k, 0, point);
     PutAtCorner(&d->axes, 0, d->axes.n_lead, d->corner, d->lo, d->hi, point);
     PetscCall(SeekCorner(d, point, &found));
     if (found) PetscFunctionReturn(PETSC_SUCCESS);
   }
   /* turn moves along the sequence until a point is new; the low-discrepancy sequence never ends, so the loop does. */
   for (PetscInt turn = 0; taken; turn++) {
-    Recur(d, k, turn, point);
+    HoldoutRecur(d, k, turn, point);
     if (corner) PutAtCorner(&d->axes, 0, d->axes.n_lead, d->corner, d->lo, d->hi, point);
     if (face && (!turn || group / N_PLACES % d->axes.n < d->axes.n_lead)) /* else its value is the only free one */
       PutOnFace(&d->axes, group / N_PLACES, k % d->together, d->lo, d->hi, point);
@@ -277,8 +278,8 @@ static PetscErrorCode Draw(const Drawing *d, PetscInt k, PetscReal point[])
 /* Points first .. first + count - 1 of the sequence: continued, it gives the same points as if drawn at once.
    slow[]: parameters that change the stiffness, of which `together` points share a value. The caller owns *unseen,
    also after an error. */
-PetscErrorCode HycoSamplesUnseen(HycoSamples samples, PetscInt first, PetscInt count, PetscInt together,
-                                 const PetscBool slow[], HycoSamples *unseen)
+PetscErrorCode HycoSamplesOutsideTraining(HycoSamples samples, PetscInt first, PetscInt count, PetscInt together,
+                                          const PetscBool slow[], HycoSamples *unseen)
 {
   Drawing d = {.seen = samples, .together = together, .corner = -1};
   PetscReal point[HYCO_MAX_PARAMETERS];
@@ -311,7 +312,7 @@ PetscErrorCode HycoSamplesUnseen(HycoSamples samples, PetscInt first, PetscInt c
     /* Also at the first point when continued in the middle of a group, whose corner is then found again. */
     if (group % N_PLACES == CORNER && (k % d.together == 0 || k == first))
       PetscCall(SeekGroupCorner(&d, group / N_PLACES));
-    PetscCall(Draw(&d, k, point));
+    PetscCall(HoldoutDraw(&d, k, point));
     PetscCall(HycoSamplesAddPoint(*unseen, point));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -345,7 +346,7 @@ PetscErrorCode HycoSamplesExcept(HycoSamples samples, HycoSamples seen, HycoSamp
   PetscCall(HycoSamplesGetScene(samples, &scene));
   PetscCall(HycoSamplesCreate(scene, rest));
   for (PetscInt k = 0; k < n; k++) {
-    PetscCall(Has(m, n_par, other, mu + k * n_par, &twin));
+    PetscCall(HoldoutContains(m, n_par, other, mu + k * n_par, &twin));
     /* Points are compared exactly: files keep all digits of what was trained. */
     if (!twin) PetscCall(HycoSamplesAddPoint(*rest, mu + k * n_par));
   }

@@ -199,8 +199,8 @@ static PetscErrorCode ReadHeader(HycoSamples s, const char path[], char *line, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The header gives the order of the columns, so that files of other programs need not be rearranged; each line must have
-   exactly one number per parameter. */
+/* The header gives the order of the columns, so that files of other programs need not be rearranged; each line must
+   have exactly one number per parameter. */
 static PetscErrorCode ReadLines(HycoSamples s, const char path[], FILE *file)
 {
   const PetscInt P = s->scene->n_parameters, before = s->n;

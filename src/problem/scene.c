@@ -68,7 +68,7 @@ static PetscErrorCode UnknownKey(const char key[], const char what[], const Hyco
 
 /* Finds or adds the member `name` of an array of structs whose first field is its name. Pointers to members are
    invalid afterwards: the array may move. New members are zero: all their expressions are not given. */
-static PetscErrorCode Member(const char name[], size_t size, PetscInt *n, void **array, PetscInt *index)
+static PetscErrorCode SceneMember(const char name[], size_t size, PetscInt *n, void **array, PetscInt *index)
 {
   char *items = (char *)*array;
 
@@ -341,7 +341,7 @@ static PetscErrorCode FindBody(HycoScene s, const char name[], HycoBody **body)
   PetscInt k = 0;
 
   PetscFunctionBegin;
-  PetscCall(Member(name, sizeof(HycoBody), &s->n_bodies, (void **)&s->body, &k));
+  PetscCall(SceneMember(name, sizeof(HycoBody), &s->n_bodies, (void **)&s->body, &k));
   *body = &s->body[k];
   if (!(*body)->law) {
     HycoDeclared *declared;
@@ -352,8 +352,8 @@ static PetscErrorCode FindBody(HycoScene s, const char name[], HycoBody **body)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fields that every law has are read here, by their place in body_fields; all others must be constants that the body's law
-   declares. */
+/* Fields that every law has are read here, by their place in body_fields; all others must be constants that the body's
+   law declares. */
 static PetscErrorCode ReadBody(HycoScene s, PetscInt entry, const char rest[])
 {
   const char *key = s->key[entry], *constant;
@@ -452,7 +452,7 @@ static PetscErrorCode ReadForce(HycoScene s, PetscInt entry, const char name[], 
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   /* Points and lines exist only in the mesh: whether the group does is checked when the mesh is read. */
-  PetscCall(Member(name, sizeof(HycoPointLoad), &s->n_point_loads, (void **)&s->point_load, &k));
+  PetscCall(SceneMember(name, sizeof(HycoPointLoad), &s->n_point_loads, (void **)&s->point_load, &k));
   PetscCall(NewColdExpr(s, entry, &s->point_load[k].force[field]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -472,16 +472,16 @@ static PetscErrorCode ReadGroups(HycoScene s, PetscInt entry, char names[], Pets
     if (strncasecmp(key, "force_", 6) == 0) {
       PetscCall(ReadForce(s, entry, name, field));
     } else if (strncasecmp(key, "spring_", 7) == 0) {
-      PetscCall(Member(name, sizeof(HycoSpring), &s->n_springs, (void **)&s->spring, &k));
+      PetscCall(SceneMember(name, sizeof(HycoSpring), &s->n_springs, (void **)&s->spring, &k));
       PetscCall(NewColdExpr(s, entry, &s->spring[k].stiffness[field]));
     } else if (strncasecmp(key, "fixed_", 6) == 0) {
-      PetscCall(Member(name, sizeof(HycoFixed), &s->n_fixed, (void **)&s->fixed, &k));
+      PetscCall(SceneMember(name, sizeof(HycoFixed), &s->n_fixed, (void **)&s->fixed, &k));
       PetscCall(NewColdExpr(s, entry,
                             field < 3    ? &s->fixed[k].value[field]
                             : field == 3 ? &s->fixed[k].normal
                                          : &s->fixed[k].direction[field - 4]));
     } else {
-      PetscCall(Member(name, sizeof(HycoLoad), &s->n_loads, (void **)&s->load, &k));
+      PetscCall(SceneMember(name, sizeof(HycoLoad), &s->n_loads, (void **)&s->load, &k));
       PetscCall(NewColdExpr(s, entry, field < 0 ? &s->load[k].pressure : &s->load[k].traction[field]));
     }
   }
@@ -775,7 +775,7 @@ PetscReal HycoSceneBetween(HycoScene s, PetscInt p, PetscReal lo, PetscReal hi, 
 
 /* Reads everything from the entries in scene->options. The order matters: variables and constants before the
    expressions that use them. */
-static PetscErrorCode Build(HycoScene s, const char folder[])
+static PetscErrorCode SceneBuild(HycoScene s, const char folder[])
 {
   PetscFunctionBegin;
   PetscCall(PetscStrallocpy(folder, &s->folder));
@@ -816,8 +816,8 @@ static PetscErrorCode Build(HycoScene s, const char folder[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reading the file is collective; building the scene from its entries is done by each rank for itself, and an error on one
-   is raised on all. */
+/* Reading the file is collective; building the scene from its entries is done by each rank for itself, and an error on
+   one is raised on all. */
 static PetscErrorCode LoadInto(HycoScene s, const char path[])
 {
   char folder[PETSC_MAX_PATH_LEN] = "";
@@ -826,7 +826,7 @@ static PetscErrorCode LoadInto(HycoScene s, const char path[])
   HycoOnEach(HycoComm(s), HycoReserveBLAS());
   PetscCall(HycoEntriesRead(HycoComm(s), path, &s->options, folder));
   PetscCall(PetscObjectSetOptions((PetscObject)s, s->options));
-  HycoOnEach(HycoComm(s), Build(s, folder));
+  HycoOnEach(HycoComm(s), SceneBuild(s, folder));
   HycoOnEach(HycoComm(s), HycoEntriesShare(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -860,7 +860,7 @@ static PetscErrorCode FillFromEntries(HycoScene s, PetscInt n, char *const key[]
   }
   PetscCall(HycoEntriesOverride(s->options, PETSC_TRUE));
   PetscCall(PetscObjectSetOptions((PetscObject)s, s->options));
-  PetscCall(Build(s, folder));
+  PetscCall(SceneBuild(s, folder));
   PetscCall(HycoEntriesShare(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -11,7 +11,7 @@ typedef struct {
 } Point;
 
 /* By the parameters in p->order, then by the place in the batch: equal points stay in the caller's order. */
-static int Compare(const void *a, const void *b)
+static int BatchCompare(const void *a, const void *b)
 {
   const Point *p = a, *q = b;
 
@@ -25,7 +25,7 @@ static int Compare(const void *a, const void *b)
 
 /* Points in an order in which the parameters that the stiffness depends on change least often, so that consecutive
    points share its factor. The points themselves stay where they are: point[] refers to the caller's array. */
-static PetscErrorCode Sort(HycoROM m, PetscInt n, const PetscReal mu[], PetscInt order[], Point point[])
+static PetscErrorCode BatchSort(HycoROM m, PetscInt n, const PetscReal mu[], PetscInt order[], Point point[])
 {
   const PetscInt n_par = m->model->scene->n_parameters;
   PetscBool reaches[HYCO_MAX_PARAMETERS];
@@ -45,7 +45,7 @@ static PetscErrorCode Sort(HycoROM m, PetscInt n, const PetscReal mu[], PetscInt
 
     point[k] = here;
   }
-  if (n) qsort(point, (size_t)n, sizeof(*point), Compare);
+  if (n) qsort(point, (size_t)n, sizeof(*point), BatchCompare);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -119,7 +119,7 @@ PetscErrorCode HycoROMSolveMany(HycoROM m, PetscInt n, PetscInt n_parameters, co
   PetscCall(HycoROMCheckPoints(m, n, n_parameters, mu));
   PetscCall(HycoROMSetUp(m));
   PetscCall(PetscMalloc1(n, &point));
-  ierr = Sort(m, n, mu, order, point);
+  ierr = BatchSort(m, n, mu, order, point);
   if (!ierr) ierr = SolveEach(m, n, point, prediction, Lambda, U);
   /* Also after an error: the handle's vectors then belong to some point of the batch, which the getters must not
      show. */
@@ -130,8 +130,8 @@ PetscErrorCode HycoROMSolveMany(HycoROM m, PetscInt n, PetscInt n_parameters, co
 }
 
 /* Gives all ranks the rows of each, `bytes` per point. */
-static PetscErrorCode Share(MPI_Comm comm, size_t bytes, const PetscMPIInt count[], const PetscMPIInt first[],
-                            void *rows)
+static PetscErrorCode BatchShare(MPI_Comm comm, size_t bytes, const PetscMPIInt count[], const PetscMPIInt first[],
+                                 void *rows)
 {
   MPI_Datatype row;
 
@@ -195,9 +195,9 @@ PetscErrorCode HycoROMSolveShared(MPI_Comm comm, HycoROM m, PetscInt n, PetscInt
   HycoOnEach(comm, HycoROMSolveMany(m, count[HycoRank(comm)], n_parameters, mu + at * (size_t)n_parameters,
                                     prediction ? prediction + at : NULL,
                                     Lambda ? Lambda + at * (size_t)n_contacts : NULL, U ? U + at * n_dof : NULL));
-  PetscCall(Share(comm, sizeof(*prediction), count, first, prediction));
-  PetscCall(Share(comm, (size_t)n_contacts * sizeof(*Lambda), count, first, Lambda));
-  PetscCall(Share(comm, n_dof * sizeof(*U), count, first, U));
+  PetscCall(BatchShare(comm, sizeof(*prediction), count, first, prediction));
+  PetscCall(BatchShare(comm, (size_t)n_contacts * sizeof(*Lambda), count, first, Lambda));
+  PetscCall(BatchShare(comm, n_dof * sizeof(*U), count, first, U));
   PetscCall(PetscFree2(count, first));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -49,7 +49,7 @@ PetscErrorCode HycoROMBringRows(HycoROM m, const PetscReal mu[])
 }
 
 /* U = u0 + V gamma on the nodes of fe from the first unknown on. */
-static void Expand(HycoROM m, HycoFE fe, PetscInt first)
+static void CompleteExpand(HycoROM m, HycoFE fe, PetscInt first)
 {
   const PetscInt l = m->model->l;
 
@@ -65,7 +65,7 @@ static void Expand(HycoROM m, HycoFE fe, PetscInt first)
 PetscErrorCode HycoROMExpand(HycoROM m)
 {
   PetscFunctionBegin;
-  Expand(m, m->fe, 0);
+  CompleteExpand(m, m->fe, 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -124,7 +124,7 @@ PetscErrorCode HycoROMComplete(HycoROM m)
   PetscFunctionBegin;
   if (m->fe->mesh == m->model->mesh || m->beyond_current) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoROMBringContacts(m, &fe));
-  Expand(m, fe, m->fe->n_dof);
+  CompleteExpand(m, fe, m->fe->n_dof);
   m->beyond_current = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -22,7 +22,7 @@ PetscErrorCode HycoCarriedDestroy(HycoCarried *carried)
 }
 
 /* Created on demand. */
-static PetscErrorCode Make(HycoROM m)
+static PetscErrorCode ContactResultsMake(HycoROM m)
 {
   HycoCarried c;
 
@@ -40,7 +40,7 @@ static PetscErrorCode Make(HycoROM m)
 }
 
 /* Updates the geometry to fe's parameters, unless no change affects it. */
-static PetscErrorCode Bring(HycoROM m, HycoFE fe)
+static PetscErrorCode ContactResultsUpdate(HycoROM m, HycoFE fe)
 {
   HycoCarried c = m->carried;
   PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
@@ -68,14 +68,14 @@ PetscBool HycoROMHasAllForces(HycoROM m)
 }
 
 /* Creates and updates the geometry; *least: a force up to it counts as zero. */
-static PetscErrorCode Prepare(HycoROM m, const PetscReal Lambda[], HycoFE *fe, PetscReal *least)
+static PetscErrorCode ContactResultsPrepare(HycoROM m, const PetscReal Lambda[], HycoFE *fe, PetscReal *least)
 {
   PetscReal most = 0;
 
   PetscFunctionBegin;
   PetscCall(HycoROMBringContacts(m, fe));
-  PetscCall(Make(m));
-  PetscCall(Bring(m, *fe));
+  PetscCall(ContactResultsMake(m));
+  PetscCall(ContactResultsUpdate(m, *fe));
   for (PetscInt k = 0; k < m->pairs.n; k++) most = PetscMax(most, Lambda[k]);
   *least = HYCO_PRESSES * most;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -91,7 +91,7 @@ PetscErrorCode HycoROMSumContacts(HycoROM m, const PetscReal Lambda[], const Hyc
   PetscFunctionBegin;
   *result = NULL;
   if (!HycoROMHasAllForces(m)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Prepare(m, Lambda, &fe, &least));
+  PetscCall(ContactResultsPrepare(m, Lambda, &fe, &least));
   PetscCall(PetscMalloc1(m->pairs.n, &pressure));
   PetscCall(HycoContactPressures(PETSC_COMM_SELF, fe, &m->pairs, m->carried->area, Lambda, pressure));
   PetscCall(HycoContactResults(fe, &m->pairs, m->carried->normal, m->carried->area, Lambda, pressure, least,
@@ -117,7 +117,7 @@ PetscErrorCode HycoROMPushBodies(HycoROM m, const PetscReal Lambda[], const Pets
   HycoFE fe;
 
   PetscFunctionBegin;
-  PetscCall(Prepare(m, Lambda, &fe, &least));
+  PetscCall(ContactResultsPrepare(m, Lambda, &fe, &least));
   *force = 0;
   for (PetscInt k = 0; k < m->pairs.n; k++) {
     const HycoShear *shear = m->pairs.shear;

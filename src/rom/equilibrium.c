@@ -37,8 +37,9 @@ PetscErrorCode HycoBalanceDestroy(HycoBalance *balance)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Everything that a measurement of a whole-mesh path needs; kept in the model, because each held-out path is measured. */
-static PetscErrorCode Create(HycoROM m, HycoBalance b)
+/* Everything that a measurement of a whole-mesh path needs; kept in the model, because each held-out path is
+   measured. */
+static PetscErrorCode EquilibriumCreate(HycoROM m, HycoBalance b)
 {
   const HycoFE fe = m->fe_whole;
   /* One more than the listed times: a path that ends early has its end as the last row. */
@@ -82,7 +83,7 @@ static PetscErrorCode HoldFloating(HycoFE fe, Mat K)
 }
 
 /* Factors K at fe's parameters, unless the present factor is valid. */
-static PetscErrorCode Factor(HycoROM m, HycoBalance b)
+static PetscErrorCode EquilibriumFactor(HycoROM m, HycoBalance b)
 {
   const HycoFE fe = m->fe_whole;
   PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
@@ -138,7 +139,7 @@ static void AddContact(HycoROM m, HycoBalance b, PetscInt j, PetscReal f[])
     PetscReal bu = 0;
 
     for (PetscInt i = B->start[k]; i < B->start[k + 1]; i++) {
-      /* U_whole is the displacement of time j: March() has set it before this call. */
+      /* U_whole is the displacement of time j: EquilibriumTimeLoop() has set it before this call. */
       bu += B->value[i] * m->U_whole[B->dof[i]];
       f[B->dof[i]] += B->value[i] * L[k];
     }
@@ -178,12 +179,12 @@ static PetscErrorCode MeasureTime(HycoROM m, HycoBalance b, HycoReplay *replay, 
 }
 
 /* Replays the laws from the first time to the last; ends where a law has no solution. */
-static PetscErrorCode March(HycoROM m, HycoBalance b, HycoReplay *replay)
+static PetscErrorCode EquilibriumTimeLoop(HycoROM m, HycoBalance b, HycoReplay *replay)
 {
   const HycoTrace *trace = &m->trace;
 
   PetscFunctionBegin;
-  PetscCall(Factor(m, b));
+  PetscCall(EquilibriumFactor(m, b));
   for (PetscInt k = 0, j = 0; k < trace->n && j < trace->n_listed; k++) {
     HycoFEStepReport report;
 
@@ -202,7 +203,7 @@ static PetscErrorCode March(HycoROM m, HycoBalance b, HycoReplay *replay)
 }
 
 /* Of values >= 0; 0 for none. */
-static PetscReal Largest(PetscInt n, const PetscReal value[])
+static PetscReal EquilibriumLargest(PetscInt n, const PetscReal value[])
 {
   PetscReal most = 0;
 
@@ -229,11 +230,11 @@ static PetscReal ContactResidual(HycoROM m, const HycoBalance b, PetscInt j, Pet
 
 /* Sets the results from all times, relative to the path's largest values. Relative to the largest of the path, as
    held-out errors are: early steps with small loads would dominate otherwise. */
-static void Summarise(HycoROM m, HycoBalance b, HycoEquilibrium *e)
+static void EquilibriumSummarise(HycoROM m, HycoBalance b, HycoEquilibrium *e)
 {
   const PetscInt n = m->trace.n_listed;
-  const PetscReal size = Largest(n, b->size), approach = Largest(n, b->approach),
-                  force = Largest(n * m->model->pairs.n, m->trace.Lambda);
+  const PetscReal size = EquilibriumLargest(n, b->size), approach = EquilibriumLargest(n, b->approach),
+                  force = EquilibriumLargest(n * m->model->pairs.n, m->trace.Lambda);
 
   *e = (HycoEquilibrium){.n = n, .residual = b->residual, .contact = b->contact};
   for (PetscInt j = 0; j < n; j++) {
@@ -245,26 +246,26 @@ static void Summarise(HycoROM m, HycoBalance b, HycoEquilibrium *e)
   }
 }
 
-/* Replays the laws along the last predicted path and measures the residual of equilibrium at each listed time; a law that
-   has no solution there gives an infinite residual with the reason, not an error. */
-static PetscErrorCode Measure(HycoROM m, HycoBalance b, HycoEquilibrium *e)
+/* Replays the laws along the last predicted path and measures the residual of equilibrium at each listed time; a law
+   that has no solution there gives an infinite residual with the reason, not an error. */
+static PetscErrorCode EquilibriumMeasure(HycoROM m, HycoBalance b, HycoEquilibrium *e)
 {
   HycoReplay replay = {0};
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   b->why[0] = '\0';
-  if (!b->K) PetscCall(Create(m, b));
+  if (!b->K) PetscCall(EquilibriumCreate(m, b));
   m->whole_current = PETSC_FALSE; /* the replay overwrites U_whole */
   ierr = HycoReplayBegin(m, m->fe_whole, &replay);
-  if (!ierr) ierr = March(m, b, &replay);
+  if (!ierr) ierr = EquilibriumTimeLoop(m, b, &replay);
   /* Before the error is raised: the replay holds states in the FE, which the next prediction uses. */
   PetscCall(HycoReplayEnd(&replay));
   PetscCall(ierr);
   if (b->why[0])
     *e = (HycoEquilibrium){.worst = PETSC_INFINITY, .worst_contact = PETSC_INFINITY, .why = b->why};
   else
-    Summarise(m, b, e);
+    EquilibriumSummarise(m, b, e);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -281,7 +282,7 @@ PetscErrorCode HycoROMGetEquilibrium(HycoROM m, HycoEquilibrium *e)
   HycoCheck(m->model->scene->n_times, "HycoROMGetEquilibrium: the model's scene has no history");
   PetscCall(HycoROMLoadWhole(m));
   if (!m->balance) PetscCall(PetscNew(&m->balance));
-  ierr = m->balanced ? PETSC_SUCCESS : Measure(m, m->balance, &m->balance->last);
+  ierr = m->balanced ? PETSC_SUCCESS : EquilibriumMeasure(m, m->balance, &m->balance->last);
   m->balanced = (PetscBool)!ierr;
   if (ierr) PetscCall(HycoBalanceDestroy(&m->balance));
   PetscCall(ierr);

@@ -9,8 +9,9 @@
     4  tail         the last quarter of the modes' coefficients relative to all: indicates the error of truncation
 
   Outside the region of training the estimate is multiplied by (1 + b / d)^2, b the scaled distance from it and d the
-  spacing of the training points, or by the Lebesgue function of what is interpolated there if that is more. K's rows on the interface lack the cells outside the RID, so that no residual can be
-  computed there; the misfit measures the disagreement between the two sides of the interface instead.
+  spacing of the training points, or by the Lebesgue function of what is interpolated there if that is more. K's rows on
+  the interface lack the cells outside the RID, so that no residual can be computed there; the misfit measures the
+  disagreement between the two sides of the interface instead.
 
   Held-out points do not have every regime that a prediction may meet. Where a feature is larger than at all held-out
   points, the estimates are multiplied by the ratio, and a ratio above HYCO_UNSEEN is reported. Features 1, 2 and, of
@@ -18,11 +19,11 @@
 
     5  inconsistency  |B u - D| of the closed contacts, weighted by their forces, relative to their largest displacement
     6  new contacts   share of the force at contacts that no training solution closes
-    7  outside        share of the force outside the RID; of bodies, beside cells with modes at some of their nodes alone
-    8  remainder      of the reconstruction (41), relative to the forces in the RID
+    7  outside        share of the force outside the RID; of bodies, beside cells with modes at some of their nodes
+    alone 8  remainder      of the reconstruction (41), relative to the forces in the RID
 
-  6 and 8 do not concern models that give accurate forces of all contacts, and 7 concerns their stresses alone. A displacement that does not follow its forces
-  is a failure of the prediction.
+  6 and 8 do not concern models that give accurate forces of all contacts, and 7 concerns their stresses alone. A
+  displacement that does not follow its forces is a failure of the prediction.
 
   The scene's outputs have formulas of their own, for absolute errors: an output may pass through zero. An estimate is
   at least HYCO_OUTPUT_ROUND_OFF of the largest absolute value of the output at the held-out points.
@@ -64,14 +65,14 @@ static const PetscReal slight[HYCO_FEATURES] = {1e-6, 1e-6, 1e-3, 0, 0, 1e-7, 0.
 #define UNBALANCED   1e-8 /* forces that balance to it are those that balance but for round-off */
 
 /* Of sums of squares; x / 0 counts as 1, a full error, and stays finite for the formulas. */
-static PetscReal Quotient(PetscReal part2, PetscReal size2)
+static PetscReal EstimateQuotient(PetscReal part2, PetscReal size2)
 {
   return size2 > 0 ? PetscSqrtReal(part2 / size2) : part2 > 0 ? 1 : 0;
 }
 
 /* How far the full-order displacements are from what the modes alone would give there, relative to their size: a basis
    that describes the solution well makes both agree. */
-static PetscReal Misfit(HycoROM m)
+static PetscReal EstimateMisfit(HycoROM m)
 {
   PetscReal lost = 0, size = 0;
 
@@ -85,12 +86,12 @@ static PetscReal Misfit(HycoROM m)
     lost += (m->U[dof] - by_modes) * (m->U[dof] - by_modes);
     size += m->U[dof] * m->U[dof];
   }
-  return Quotient(lost, size);
+  return EstimateQuotient(lost, size);
 }
 
 /* Penetration of the contacts that the reduced system does not constrain, and forces on those that are open: what (38)
    leaves unchecked outside the RID. */
-static void Contacts(HycoROM m, PetscReal *penetration, PetscReal *adhesion)
+static void EstimateContacts(HycoROM m, PetscReal *penetration, PetscReal *adhesion)
 {
   PetscReal in = 0, moved = 0, stuck = 0, force = 0;
 
@@ -106,13 +107,13 @@ static void Contacts(HycoROM m, PetscReal *penetration, PetscReal *adhesion)
     else if (bu < m->rows.gap[k])
       stuck += m->Lambda[k] * m->Lambda[k];
   }
-  *penetration = Quotient(in, moved);
-  *adhesion = Quotient(stuck, force);
+  *penetration = EstimateQuotient(in, moved);
+  *adhesion = EstimateQuotient(stuck, force);
 }
 
 /* What the displacement misses of the gaps at contacts with a force, relative to the largest displacement of the
    contacts' nodes, along the surface too: where contacts close without a gap, that across it is round-off. */
-static PetscReal Inconsistency(HycoROM m)
+static PetscReal EstimateSceneResidual(HycoROM m)
 {
   const PetscInt dim = m->fe->dim;
   PetscReal lost = 0, force = 0, size = 0;
@@ -127,11 +128,11 @@ static PetscReal Inconsistency(HycoROM m)
     lost += m->Lambda[k] * PetscSqr(HycoROMAddRow(m, k, -m->rows.gap[k]));
     force += m->Lambda[k];
   }
-  return Quotient(force > 0 ? lost / force : 0, size * size);
+  return EstimateQuotient(force > 0 ? lost / force : 0, size * size);
 }
 
 /* Shares of the force that indicate a regime: at contacts without a force in training, and outside the RID. */
-static void Shares(HycoROM m, PetscReal *fresh, PetscReal *outside)
+static void EstimateShares(HycoROM m, PetscReal *fresh, PetscReal *outside)
 {
   PetscReal sum = 0;
 
@@ -167,7 +168,7 @@ PetscReal HycoEstimatesDistance(HycoScene s, const PetscReal a[], const PetscRea
 }
 
 /* Tail of the POD modes only: supremizers have no singular value. */
-static PetscReal Tail(HycoROM m)
+static PetscReal EstimateTail(HycoROM m)
 {
   PetscReal last = 0, all = 0;
   const PetscInt l = HycoROMCountPOD(m);
@@ -177,7 +178,7 @@ static PetscReal Tail(HycoROM m)
     /* The last quarter: if it carries much, more modes would too. */
     if (j >= 3 * l / 4) last += m->gamma[j] * m->gamma[j];
   }
-  return Quotient(last, all);
+  return EstimateQuotient(last, all);
 }
 
 /* For the current solution; for a path at the listed time that is selected. */
@@ -192,17 +193,17 @@ static PetscErrorCode MeasureOne(HycoROM m, PetscReal feature[])
   if (m->ops->features)
     PetscUseTypeMethod(m, features, feature); /* features 0 and 1 */
   else {
-    feature[MISFIT] = Misfit(m);
-    Contacts(m, &feature[PENETRATION], &feature[ADHESION]);
+    feature[MISFIT] = EstimateMisfit(m);
+    EstimateContacts(m, &feature[PENETRATION], &feature[ADHESION]);
   }
-  feature[INCONSISTENCY] = Inconsistency(m);
+  feature[INCONSISTENCY] = EstimateSceneResidual(m);
   feature[NEW_CONTACTS] = feature[OUTSIDE] = feature[REMAINDER] = 0;
   if (!m->model->traits.forces) {
-    Shares(m, &feature[NEW_CONTACTS], &feature[OUTSIDE]);
+    EstimateShares(m, &feature[NEW_CONTACTS], &feature[OUTSIDE]);
     feature[REMAINDER] = m->remainder;
   } else
-    PetscCall(HycoROMShareTorn(m, &feature[OUTSIDE]));
-  feature[TAIL] = Tail(m);
+    PetscCall(HycoROMShareDiscontinuous(m, &feature[OUTSIDE]));
+  feature[TAIL] = EstimateTail(m);
   /* 0 without stored points or parameters: a feature that is constant drops out of the calibration. */
   feature[DISTANCE] = m->model->n_points && n_par ? PETSC_MAX_REAL : 0;
   for (PetscInt k = 0; n_par && k < m->model->n_points; k++)
@@ -249,7 +250,7 @@ static PetscErrorCode FindReach(HycoROM m)
 }
 
 /* The nearest point of the region of training, and the distance of mu from it. */
-static PetscReal Beyond(HycoROM m, const PetscReal mu[], PetscReal nearest[])
+static PetscReal EstimateBeyond(HycoROM m, const PetscReal mu[], PetscReal nearest[])
 {
   const HycoScene s = m->model->scene;
   PetscReal most = 0;
@@ -266,7 +267,7 @@ static PetscReal Beyond(HycoROM m, const PetscReal mu[], PetscReal nearest[])
 }
 
 /* term[j]: log(1 + f_j / floor_j) */
-static PetscReal Estimate(const PetscReal coefficient[], const PetscReal term[])
+static PetscReal EstimateEvaluate(const PetscReal coefficient[], const PetscReal term[])
 {
   PetscReal sum = coefficient[HYCO_ESTIMATE_FEATURES];
 
@@ -275,7 +276,7 @@ static PetscReal Estimate(const PetscReal coefficient[], const PetscReal term[])
 }
 
 /* The largest ratio of a feature to that at the held-out points; 1: none is larger. */
-static PetscReal Unseen(HycoROM m, const PetscReal feature[], PetscInt *which)
+static PetscReal EstimateOutsideTraining(HycoROM m, const PetscReal feature[], PetscInt *which)
 {
   PetscReal most = 1;
 
@@ -294,7 +295,7 @@ static PetscReal Unseen(HycoROM m, const PetscReal feature[], PetscInt *which)
 }
 
 /* Whether the displacement follows the forces; in models without held-out points only if their forces are accurate. */
-static PetscBool IsInconsistent(HycoROM m, PetscReal inconsistency)
+static PetscBool ExceedsSceneResidual(HycoROM m, PetscReal inconsistency)
 {
   const HycoEstimates *t = &m->model->estimates;
 
@@ -315,7 +316,7 @@ static PetscBool IsInconsistent(HycoROM m, PetscReal inconsistency)
 
 /* The fit extrapolates in its features; estimates far outside the errors that it was fitted to are not supported
    by any of them. largest: of the held-out errors; 0: not known. */
-static PetscReal Clamped(HycoROM m, PetscReal estimate, PetscReal largest)
+static PetscReal EstimateClamped(HycoROM m, PetscReal estimate, PetscReal largest)
 {
   const PetscReal under = m->trace.n_listed ? MOST_UNDER_PATH : MOST_UNDER;
 
@@ -328,7 +329,8 @@ static PetscReal EstimateError(HycoROM m, const PetscReal law[], const PetscReal
 {
   const PetscReal few = PetscSqrtReal(PetscMax(1, MANY / (PetscReal)m->model->estimates.n));
 
-  return m->model->traits.uniform ? MOST_OVER * few * largest : Clamped(m, Estimate(law, term), largest);
+  return m->model->traits.uniform ? MOST_OVER * few * largest
+                                  : EstimateClamped(m, EstimateEvaluate(law, term), largest);
 }
 
 /* The norm of the predicted field that the output follows, and the kind of error of that field. */
@@ -340,10 +342,10 @@ PetscReal HycoOutputNorm(const HycoQuantity *q, const HycoPrediction *p, HycoEst
   return forces ? p->lambda_norm2 : p->u_norm2;
 }
 
-/* Of a type whose errors do not follow the features. Few held-out points seldom have the largest error: it grows with the
-   field that the output follows, and with the estimated error of that field, whose bound knows many samples, as far as
-   the output followed its errors; at most MOST_FOLLOWED times. (Sets of 8 of 100 points of examples/hertz, blocks and
-   pellet: the largest error times the factor bounds 96.5 to 100 % of the others, by output; so 99.5 to 100 %.) */
+/* Of a type whose errors do not follow the features. Few held-out points seldom have the largest error: it grows with
+   the field that the output follows, and with the estimated error of that field, whose bound knows many samples, as far
+   as the output followed its errors; at most MOST_FOLLOWED times. (Sets of 8 of 100 points of examples/hertz, blocks
+   and pellet: the largest error times the factor bounds 96.5 to 100 % of the others, by output; so 99.5 to 100 %.) */
 static PetscReal FollowField(HycoROM m, PetscInt q, const HycoPrediction *p, const PetscReal field[])
 {
   const HycoOutputEstimate *o = &m->model->estimates.output[q];
@@ -388,13 +390,14 @@ static void EvaluateFormulas(HycoROM m, const PetscReal feature[], PetscReal fac
   }
 }
 
-/* What a new regime adds to the estimates. Of forces beside cells that have modes at some of their nodes alone, which are
-   accurate, the stresses of such cells alone have none: *torn. */
-static PetscReal UnseenFactor(HycoROM m, HycoPrediction *p, const PetscReal feature[], PetscBool *torn)
+/* What a new regime adds to the estimates. Of forces beside cells that have modes at some of their nodes alone, which
+   are accurate, the stresses of such cells alone have none: *torn. */
+static PetscReal OutsideTrainingFactor(HycoROM m, HycoPrediction *p, const PetscReal feature[],
+                                       PetscBool *discontinuous)
 {
-  p->unseen = Unseen(m, feature, &p->unseen_feature);
-  *torn = (PetscBool)(m->model->traits.uniform && p->unseen_feature == OUTSIDE && p->unseen > HYCO_UNSEEN);
-  return *torn ? 1 : PetscMin(p->unseen, MOST_FACTOR);
+  p->unseen = EstimateOutsideTraining(m, feature, &p->unseen_feature);
+  *discontinuous = (PetscBool)(m->model->traits.uniform && p->unseen_feature == OUTSIDE && p->unseen > HYCO_UNSEEN);
+  return *discontinuous ? 1 : PetscMin(p->unseen, MOST_FACTOR);
 }
 
 /* From the features of the prediction; nearest: the point of the region of training. */
@@ -402,22 +405,23 @@ static PetscErrorCode EvaluateFeatures(HycoROM m, const PetscReal nearest[], Hyc
 {
   const HycoEstimates *t = &m->model->estimates;
   PetscReal feature[HYCO_FEATURES], outside;
-  PetscBool torn;
+  PetscBool discontinuous;
 
   PetscFunctionBegin;
   PetscCall(HycoEstimatesFeatures(m, feature));
   p->inconsistency = feature[INCONSISTENCY];
-  p->inconsistent = IsInconsistent(m, p->inconsistency);
+  p->inconsistent = ExceedsSceneResidual(m, p->inconsistency);
   if (t->n) {
-    const PetscReal factor = UnseenFactor(m, p, feature, &torn);
+    const PetscReal factor = OutsideTrainingFactor(m, p, feature, &discontinuous);
 
-    /* Beyond the training the estimates grow with the square of the distance in units of a usual distance between points. */
+    /* Beyond the training the estimates grow with the square of the distance in units of a usual distance between
+       points. */
     outside = 1 + (p->beyond > 0 ? HycoEstimatesDistance(m->model->scene, m->fe->mu, nearest) / t->floor[DISTANCE] : 0);
     outside = p->beyond > 0 ? PetscMax(outside * outside, m->stretch) : 1;
     /* Beside contacts that no solution closed no error was ever measured. */
     if (p->unseen_feature != NEW_CONTACTS || p->unseen <= HYCO_UNSEEN)
       EvaluateFormulas(m, feature, outside * factor, p);
-    for (PetscInt q = 0; torn && q < t->n_outputs; q++) {
+    for (PetscInt q = 0; discontinuous && q < t->n_outputs; q++) {
       if (HycoQuantityOfStress(&m->model->scene->quantity[q])) p->estimated_error_quantity[q] = -1;
     }
   }
@@ -449,7 +453,7 @@ PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
   p->unseen_feature = -1;
   PetscCall(FindReach(m));
   /* Reported whether or not there are estimates. */
-  p->beyond = Beyond(m, m->fe->mu, nearest);
+  p->beyond = EstimateBeyond(m, m->fe->mu, nearest);
   m->stretch = 1;
   if (p->reason > 0) PetscTryTypeMethod(m, estimate, p);
   /* Features of forces outside the RID need the reconstruction. */

@@ -1,7 +1,7 @@
 /*
   The parameter values at which a model's outputs are closest to targets, min 1/2 |r|^2 within the ranges with
-  r_k = (output_k - target_k) / scale_k, by a TAO type on the model's gradients. There may be several minima: it starts at
-  the best of some points over the ranges.
+  r_k = (output_k - target_k) / scale_k, by a TAO type on the model's gradients. There may be several minima: it starts
+  at the best of some points over the ranges.
 */
 #include <hycoalgorithms.h>
 #include <hycoromimpl.h>
@@ -9,9 +9,11 @@
 #include <petsctao.h>
 #include <string.h>
 
-#define EXACT      1e-9 /* a misfit below it is round-off */
-#define MINIMUM    1e-5 /* of the slope of the misfit, relative to what the derivatives allow */
-#define WEIGHT     1e-6 /* of the regularisation of Gauss-Newton steps: for targets that do not determine all parameters */
+#define EXACT   1e-9 /* a misfit below it is round-off */
+#define MINIMUM 1e-5 /* of the slope of the misfit, relative to what the derivatives allow */
+#define WEIGHT                                                                                                         \
+  1e-6                  /* of the regularisation of Gauss-Newton steps: for targets that do not determine all
+                           parameters */
 #define SAME       1e-4 /* relative difference of misfits that are one minimum's */
 #define STALLED    5    /* iterations in which a misfit that does not fall by SAME ends */
 #define ITERATIONS 200
@@ -29,8 +31,8 @@ typedef struct {
   PetscReal lo[HYCO_MAX_PARAMETERS], hi[HYCO_MAX_PARAMETERS]; /* of a held parameter both are its value */
   PetscInt evaluations;
   /* at the last point: */
-  PetscReal x[HYCO_MAX_PARAMETERS], r[HYCO_MAX_QUANTITIES],
-      J[HYCO_MAX_QUANTITIES * HYCO_MAX_PARAMETERS]; /* shares of the ranges; J: n x n_par */
+  /* shares of the ranges; J: n x n_par */
+  PetscReal x[HYCO_MAX_PARAMETERS], r[HYCO_MAX_QUANTITIES], J[HYCO_MAX_QUANTITIES * HYCO_MAX_PARAMETERS];
   PetscBool known, kink;
   HycoPrediction prediction;
 } Fit;
@@ -43,7 +45,7 @@ static void ToParameters(const Fit *f, const PetscReal x[], PetscReal mu[])
     mu[p] = PetscMin(PetscMax(f->lo[p] + x[p] * (f->hi[p] - f->lo[p]), f->lo[p]), f->hi[p]);
 }
 
-static PetscReal Size(PetscInt n, const PetscReal v[])
+static PetscReal FitSize(PetscInt n, const PetscReal v[])
 {
   PetscReal sum = 0;
 
@@ -52,7 +54,7 @@ static PetscReal Size(PetscInt n, const PetscReal v[])
 }
 
 /* The output of target k: those of the end of a path are followed by their extremes. */
-static PetscReal Value(const Fit *f, const HycoPrediction *p, PetscInt k)
+static PetscReal FitValue(const Fit *f, const HycoPrediction *p, PetscInt k)
 {
   const PetscInt q = f->output[k], n = f->model->model->scene->n_quantities;
 
@@ -60,14 +62,14 @@ static PetscReal Value(const Fit *f, const HycoPrediction *p, PetscInt k)
 }
 
 /* Divided by the scales, so that outputs of different units weigh the same. */
-static void Misfit(const Fit *f, const HycoPrediction *p, PetscReal r[])
+static void FitMisfit(const Fit *f, const HycoPrediction *p, PetscReal r[])
 {
-  for (PetscInt k = 0; k < f->n; k++) r[k] = (Value(f, p, k) - f->target[k]) / f->scale[k];
+  for (PetscInt k = 0; k < f->n; k++) r[k] = (FitValue(f, p, k) - f->target[k]) / f->scale[k];
 }
 
 /* The derivatives at mu, of which the prediction is the model's last; where there are none, as at the end of a range at
    which no load presses a body, those a little inside the ranges. */
-static PetscErrorCode Differentiate(Fit *f, const PetscReal mu[], HycoGradient *g)
+static PetscErrorCode FitDifferentiate(Fit *f, const PetscReal mu[], HycoGradient *g)
 {
   PetscReal inside[HYCO_MAX_PARAMETERS];
   char message[HYCO_LINE];
@@ -83,7 +85,7 @@ static PetscErrorCode Differentiate(Fit *f, const PetscReal mu[], HycoGradient *
 }
 
 /* r and J at x. */
-static PetscErrorCode Evaluate(Fit *f, const PetscReal x[])
+static PetscErrorCode FitEvaluate(Fit *f, const PetscReal x[])
 {
   HycoGradient g;
   PetscReal mu[HYCO_MAX_PARAMETERS];
@@ -100,8 +102,8 @@ static PetscErrorCode Evaluate(Fit *f, const PetscReal x[])
   PetscCall(HycoROMGetPrediction(f->model, &f->prediction));
   HycoCheck(f->prediction.reason > 0, "a prediction of the fit failed: %s",
             f->prediction.why[0] ? f->prediction.why : HycoReasonName(f->prediction.reason));
-  PetscCall(Differentiate(f, mu, &g));
-  Misfit(f, &f->prediction, f->r);
+  PetscCall(FitDifferentiate(f, mu, &g));
+  FitMisfit(f, &f->prediction, f->r);
   f->kink = PETSC_FALSE;
   for (PetscInt k = 0; k < f->n; k++) {
     for (PetscInt p = 0; p < f->n_par; p++) {
@@ -125,13 +127,13 @@ static PetscErrorCode EvaluateVec(Fit *f, Vec X)
 
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(X, &x));
-  HycoFinally(Evaluate(f, x), PetscCall(VecRestoreArrayRead(X, &x)));
+  HycoFinally(FitEvaluate(f, x), PetscCall(VecRestoreArrayRead(X, &x)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* TAO's callback for Gauss-Newton. TAO may ask for residual and Jacobian at the same point: Evaluate() keeps the last
-   one. */
-static PetscErrorCode Residual(Tao tao, Vec X, Vec R, void *ctx)
+/* TAO's callback for Gauss-Newton. TAO may ask for residual and Jacobian at the same point: FitEvaluate() keeps the
+   last one. */
+static PetscErrorCode FitResidual(Tao tao, Vec X, Vec R, void *ctx)
 {
   Fit *f = (Fit *)ctx;
   PetscScalar *r;
@@ -146,7 +148,7 @@ static PetscErrorCode Residual(Tao tao, Vec X, Vec R, void *ctx)
 }
 
 /* By rows: outputs; columns: parameters in units of their ranges, so that steps in all of them are comparable. */
-static PetscErrorCode Jacobian(Tao tao, Vec X, Mat J, Mat P, void *ctx)
+static PetscErrorCode FitJacobian(Tao tao, Vec X, Mat J, Mat P, void *ctx)
 {
   Fit *f = (Fit *)ctx;
 
@@ -163,7 +165,7 @@ static PetscErrorCode Jacobian(Tao tao, Vec X, Mat J, Mat P, void *ctx)
 }
 
 /* J^T r */
-static void Slope(const Fit *f, PetscReal g[])
+static void FitDerivative(const Fit *f, PetscReal g[])
 {
   for (PetscInt p = 0; p < f->n_par; p++) {
     g[p] = 0;
@@ -171,9 +173,9 @@ static void Slope(const Fit *f, PetscReal g[])
   }
 }
 
-/* TAO's callback for limited-memory methods, with the same evaluation as Residual(), so that both types minimise one
+/* TAO's callback for limited-memory methods, with the same evaluation as FitResidual(), so that both types minimise one
    function. */
-static PetscErrorCode Objective(Tao tao, Vec X, PetscReal *value, Vec G, void *ctx)
+static PetscErrorCode FitObjective(Tao tao, Vec X, PetscReal *value, Vec G, void *ctx)
 {
   Fit *f = (Fit *)ctx;
   PetscScalar *g;
@@ -182,15 +184,15 @@ static PetscErrorCode Objective(Tao tao, Vec X, PetscReal *value, Vec G, void *c
   (void)tao;
   PetscCall(EvaluateVec(f, X));
   /* Half of the squares, so that the gradient is J^T r without a factor. */
-  *value = PetscSqr(Size(f->n, f->r)) / 2;
+  *value = PetscSqr(FitSize(f->n, f->r)) / 2;
   PetscCall(VecGetArrayWrite(G, &g));
-  Slope(f, g);
+  FitDerivative(f, g);
   PetscCall(VecRestoreArrayWrite(G, &g));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The samples with their misfits; scales of targets that are 0 are the largest outputs there. */
-static PetscErrorCode Sample(Fit *f, PetscInt n, const PetscReal mu[], PetscReal misfit[])
+static PetscErrorCode FitSample(Fit *f, PetscInt n, const PetscReal mu[], PetscReal misfit[])
 {
   HycoPrediction *p;
   PetscReal r[HYCO_MAX_QUANTITIES];
@@ -203,20 +205,21 @@ static PetscErrorCode Sample(Fit *f, PetscInt n, const PetscReal mu[], PetscReal
     /* Targets differ in size: relative differences give each the same weight. */
     f->scale[k] = PetscAbsReal(f->target[k]);
     for (PetscInt i = 0; i < n && f->target[k] == 0; i++)
-      f->scale[k] = PetscMax(f->scale[k], PetscAbsReal(Value(f, &p[i], k)));
+      f->scale[k] = PetscMax(f->scale[k], PetscAbsReal(FitValue(f, &p[i], k)));
     if (f->scale[k] == 0) f->scale[k] = 1;
   }
   for (PetscInt i = 0; i < n; i++) {
-    Misfit(f, &p[i], r);
+    FitMisfit(f, &p[i], r);
     /* Points without a solution are last in the order and never become a start. */
-    misfit[i] = p[i].reason > 0 ? Size(f->n, r) : PETSC_MAX_REAL;
+    misfit[i] = p[i].reason > 0 ? FitSize(f->n, r) : PETSC_MAX_REAL;
   }
   PetscCall(PetscFree(p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Sets the n_starts points with the smallest misfits, starts[] (shares of the ranges), the best first. */
-static PetscErrorCode Start(Fit *f, const PetscReal start[], PetscInt n_samples, PetscInt *n_starts, PetscReal starts[])
+static PetscErrorCode FitStart(Fit *f, const PetscReal start[], PetscInt n_samples, PetscInt *n_starts,
+                               PetscReal starts[])
 {
   HycoSamples samples = NULL;
   const PetscReal *all;
@@ -236,7 +239,7 @@ static PetscErrorCode Start(Fit *f, const PetscReal start[], PetscInt n_samples,
   for (PetscInt i = 0; i < n * f->n_par; i++)
     mu[i] = PetscMin(PetscMax(mu[i], f->lo[i % f->n_par]), f->hi[i % f->n_par]);
   PetscCall(PetscMalloc2(n, &misfit, n, &order));
-  PetscCall(Sample(f, n, mu, misfit));
+  PetscCall(FitSample(f, n, mu, misfit));
   for (PetscInt i = 0; i < n; i++) order[i] = i;
   PetscCall(PetscSortRealWithArrayInt(n, misfit, order));
   for (PetscInt i = 0; i < n && kept < *n_starts && misfit[i] < PETSC_MAX_REAL; i++, kept++) {
@@ -258,7 +261,7 @@ static PetscBool IsMinimum(const Fit *f, PetscReal tolerance)
 {
   PetscReal g[HYCO_MAX_PARAMETERS], most = 0;
 
-  Slope(f, g);
+  FitDerivative(f, g);
   for (PetscInt p = 0; p < f->n_par; p++) {
     /* At an end of a range the slope may point outwards. */
     const PetscBool held = (PetscBool)((f->x[p] <= 0 && g[p] > 0) || (f->x[p] >= 1 && g[p] < 0));
@@ -266,12 +269,13 @@ static PetscBool IsMinimum(const Fit *f, PetscReal tolerance)
     if (!held) most = PetscMax(most, PetscAbsReal(g[p]));
   }
   /* Relative to the sizes of J and r: the same answer whatever the units of the outputs. */
-  return (PetscBool)(Size(f->n, f->r) <= EXACT || most <= tolerance * Size(f->n * f->n_par, f->J) * Size(f->n, f->r));
+  return (PetscBool)(FitSize(f->n, f->r) <= EXACT ||
+                     most <= tolerance * FitSize(f->n * f->n_par, f->J) * FitSize(f->n, f->r));
 }
 
-/* TAO's callback after an iteration. TAO's own test of the slope has no scale: near a minimum the slope is that of round-off, or of
-   differences. */
-static PetscErrorCode Ends(Tao tao, void *ctx)
+/* TAO's callback after an iteration. TAO's own test of the slope has no scale: near a minimum the slope is that of
+   round-off, or of differences. */
+static PetscErrorCode FitConverged(Tao tao, void *ctx)
 {
   Fit *f = (Fit *)ctx;
   PetscReal size;
@@ -282,7 +286,7 @@ static PetscErrorCode Ends(Tao tao, void *ctx)
   PetscCall(TaoGetSolution(tao, &X));
   PetscCall(EvaluateVec(f, X));
   PetscCall(TaoGetIterationNumber(tao, &k));
-  size = Size(f->n, f->r);
+  size = FitSize(f->n, f->r);
   if (k % STALLED == 0) {
     if (k && size > (1 - SAME) * f->earlier) PetscCall(TaoSetConvergedReason(tao, TAO_CONVERGED_USER));
     f->earlier = size;
@@ -292,7 +296,8 @@ static PetscErrorCode Ends(Tao tao, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* TAO's own limit is 30 predictions with gradients, which a search that ends at a kink takes; there is no function for it. */
+/* TAO's own limit is 30 predictions with gradients, which a search that ends at a kink takes; there is no function for
+   it. */
 static PetscErrorCode LimitSearch(Tao tao)
 {
   TaoLineSearch search;
@@ -310,7 +315,7 @@ static PetscErrorCode LimitSearch(Tao tao)
 }
 
 /* Minimises from X by a type. */
-static PetscErrorCode Minimise(Fit *f, const char type[], Vec X)
+static PetscErrorCode FitMinimise(Fit *f, const char type[], Vec X)
 {
   const PetscBool squares = (PetscBool)(strcmp(type, TAOBRGN) == 0);
   Tao tao, inner;
@@ -326,26 +331,26 @@ static PetscErrorCode Minimise(Fit *f, const char type[], Vec X)
   PetscCall(TaoCreate(PETSC_COMM_SELF, &tao));
   PetscCall(TaoSetType(tao, type));
   if (squares) {
-    PetscCall(TaoSetResidualRoutine(tao, r, Residual, f));
-    PetscCall(TaoSetJacobianResidualRoutine(tao, J, J, Jacobian, f));
+    PetscCall(TaoSetResidualRoutine(tao, r, FitResidual, f));
+    PetscCall(TaoSetJacobianResidualRoutine(tao, J, J, FitJacobian, f));
     /* Nearly no regularisation: it would pull the answer from the targets. It must not be 0, since J^T J is singular if
        targets do not determine all parameters. */
     PetscCall(TaoBRGNSetRegularizerWeight(tao, WEIGHT));
   } else
-    PetscCall(TaoSetObjectiveAndGradient(tao, NULL, Objective, f));
+    PetscCall(TaoSetObjectiveAndGradient(tao, NULL, FitObjective, f));
   PetscCall(TaoSetSolution(tao, X));
   PetscCall(TaoSetVariableBounds(tao, lo, hi));
   inner = tao;
   if (squares) PetscCall(TaoBRGNGetSubsolver(tao, &inner));
-  PetscCall(TaoSetConvergenceTest(inner, Ends, f));
+  PetscCall(TaoSetConvergenceTest(inner, FitConverged, f));
   PetscCall(LimitSearch(inner));
   PetscCall(TaoSolve(tao));
   HycoDestroyAll(&tao, &J, &r, &lo, &hi);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From one start, by the requested type, and after it by the other one if that ends at no minimum. *minimum: the last point is
-   one. */
+/* From one start, by the requested type, and after it by the other one if that ends at no minimum. *minimum: the last
+   point is one. */
 static PetscErrorCode RunFrom(Fit *f, const PetscReal start[], const char type[], PetscBool *minimum, char method[64])
 {
   /* Gauss-Newton can stall at a kink, where the limited-memory method still descends, and the other way round. */
@@ -361,7 +366,7 @@ static PetscErrorCode RunFrom(Fit *f, const PetscReal start[], const char type[]
   *minimum = PETSC_FALSE;
   method[0] = '\0';
   for (PetscInt k = 0; k < 2 && !*minimum; k++) {
-    PetscCall(Minimise(f, types[k], X));
+    PetscCall(FitMinimise(f, types[k], X));
     PetscCall(EvaluateVec(f, X));
     *minimum = IsMinimum(f, MINIMUM);
     PetscCall(PetscStrlcat(method, k ? ", then " : "", 64));
@@ -397,7 +402,7 @@ static PetscErrorCode RunAll(Fit *f, const PetscReal starts[], const char type[]
 
     PetscCall(RunFrom(f, starts + s * f->n_par, type, &minimum, method));
     /* Root mean square, so that it does not depend on the number of targets. */
-    ends[s] = Size(f->n, f->r) / PetscSqrtReal((PetscReal)f->n);
+    ends[s] = FitSize(f->n, f->r) / PetscSqrtReal((PetscReal)f->n);
     if (s && !IsBetter(fit, ends[s], minimum)) continue;
     fit->misfit = ends[s];
     fit->converged = minimum;
@@ -434,9 +439,9 @@ static PetscErrorCode SetRanges(Fit *f, const PetscReal held[], PetscInt *n_free
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How many parameters the answer determines: those that the misfit presses against an end of their range, and of the others
-   the rank of J, whose columns of held parameters are 0. */
-static PetscErrorCode Determined(const Fit *f, PetscInt *n)
+/* How many parameters the answer determines: those that the misfit presses against an end of their range, and of the
+   others the rank of J, whose columns of held parameters are 0. */
+static PetscErrorCode FitDetermined(const Fit *f, PetscInt *n)
 {
   const PetscInt most = PetscMin(f->n, f->n_par);
   PetscReal A[HYCO_MAX_QUANTITIES * HYCO_MAX_PARAMETERS], s[HYCO_MAX_PARAMETERS];
@@ -452,7 +457,8 @@ static PetscErrorCode Determined(const Fit *f, PetscInt *n)
       size += PetscAbsReal(f->J[k * f->n_par + p] * f->r[k]);
     }
     /* Where the targets are met the slope is round-off, and the end is no reason. */
-    if (!(PetscAbsReal(slope) > LEFT * size) || Size(f->n, f->r) < LEFT || !(slope > 0 ? f->x[p] <= 0 : f->x[p] >= 1))
+    if (!(PetscAbsReal(slope) > LEFT * size) || FitSize(f->n, f->r) < LEFT ||
+        !(slope > 0 ? f->x[p] <= 0 : f->x[p] >= 1))
       continue;
     ++*n;
     for (PetscInt k = 0; k < f->n; k++) A[k * f->n_par + p] = 0;
@@ -462,7 +468,8 @@ static PetscErrorCode Determined(const Fit *f, PetscInt *n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The fit works on x in [0, 1]^n; mu is made from it at the end. Which starts are tried depends on the fixed sequence of samples, hence the same answer in every run. */
+/* The fit works on x in [0, 1]^n; mu is made from it at the end. Which starts are tried depends on the fixed sequence
+   of samples, hence the same answer in every run. */
 PetscErrorCode HycoROMFit(HycoROM m, PetscInt n, const PetscInt output[], const PetscReal target[],
                           const PetscReal start[], const PetscReal held[], PetscInt n_samples, PetscInt n_starts,
                           const char type[], PetscReal mu[], HycoFit *fit)
@@ -496,15 +503,15 @@ PetscErrorCode HycoROMFit(HycoROM m, PetscInt n, const PetscInt output[], const 
   *fit = (HycoFit){.n_starts = n_starts, .n_free = n_free};
   PetscCall(PetscMalloc1(n_starts * f.n_par + 1, &starts));
   /* As many samples as starts are asked for. */
-  PetscCall(Start(&f, start, PetscMax(n_samples, n_starts), &fit->n_starts, starts));
+  PetscCall(FitStart(&f, start, PetscMax(n_samples, n_starts), &fit->n_starts, starts));
   PetscCall(RunAll(&f, starts, type, fit, x));
   PetscCall(PetscFree(starts));
   f.known = PETSC_FALSE;
   /* Once more at the answer: the caller's getters of the model show this point, not the last start's. */
-  PetscCall(Evaluate(&f, x));
+  PetscCall(FitEvaluate(&f, x));
   ToParameters(&f, x, mu);
   fit->kink = f.kink;
-  PetscCall(Determined(&f, &fit->n_determined));
+  PetscCall(FitDetermined(&f, &fit->n_determined));
   fit->evaluations = f.evaluations;
   PetscCall(PetscArraycpy(fit->scale, f.scale, n));
   PetscFunctionReturn(PETSC_SUCCESS);

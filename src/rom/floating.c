@@ -92,7 +92,7 @@ PetscErrorCode HycoFloatingMove(HycoH5 h, HycoROM m)
 }
 
 /* Component c of motion j at node i of fe's mesh, in the unknowns there: zero where one is fixed. */
-static PetscReal At(HycoROM m, HycoFE fe, PetscInt j, PetscInt i, PetscInt c)
+static PetscReal ROMFloatingEntry(HycoROM m, HycoFE fe, PetscInt j, PetscInt i, PetscInt c)
 {
   const HycoFloating f = m->model->floating;
 
@@ -165,7 +165,8 @@ static PetscErrorCode LoadWork(HycoROM m, HycoFloating f, const PetscReal mu[], 
   for (PetscInt k = 0; !ierr && k < m->fe_floating->n_dof; k++) {
     /* The mesh has all cells with loads of these bodies, so that its nodal loads are complete. */
     for (PetscInt j = 0; load[k] != 0 && j < f->n; j++) {
-      const PetscReal term = load[k] * At(m, m->fe_floating, j, k / m->fe_floating->dim, k % m->fe_floating->dim);
+      const PetscReal term =
+          load[k] * ROMFloatingEntry(m, m->fe_floating, j, k / m->fe_floating->dim, k % m->fe_floating->dim);
 
       work[j] += term;
       size[j] += PetscAbsReal(term);
@@ -195,8 +196,8 @@ static PetscReal FrictionWork(HycoROM m, HycoFE fe, PetscInt j, PetscInt k)
   for (PetscInt c = 0; c < fe->dim; c++) {
     const PetscReal force = m->pairs.shear->force[3 * k + c] / m->Lambda[k];
 
-    work -= force * At(m, fe, j, m->pairs.slave[k], c);
-    for (PetscInt i = 0; i < n; i++) work += force * weight[i] * At(m, fe, j, master[i], c);
+    work -= force * ROMFloatingEntry(m, fe, j, m->pairs.slave[k], c);
+    for (PetscInt i = 0; i < n; i++) work += force * weight[i] * ROMFloatingEntry(m, fe, j, master[i], c);
   }
   return work;
 }
@@ -214,7 +215,7 @@ static PetscErrorCode FillDual(HycoROM m, HycoFE fe, Dual *d)
     PetscCall(PetscArrayzero(work, d->p));
     for (PetscInt e = m->rows.start[k]; e < m->rows.start[k + 1]; e++) {
       for (PetscInt j = 0; j < d->p; j++)
-        work[j] += m->rows.value[e] * At(m, fe, j, m->rows.dof[e] / fe->dim, m->rows.dof[e] % fe->dim);
+        work[j] += m->rows.value[e] * ROMFloatingEntry(m, fe, j, m->rows.dof[e] / fe->dim, m->rows.dof[e] % fe->dim);
     }
     for (PetscInt j = 0; m->pairs.shear && j < d->p; j++) work[j] += FrictionWork(m, fe, j, k);
     d->contact[d->n++] = k;
@@ -223,8 +224,8 @@ static PetscErrorCode FillDual(HycoROM m, HycoFE fe, Dual *d)
 }
 
 /* The dual function at c, its gradient and its Hessian (p x p) there; the size of the terms of the gradient. */
-static PetscReal Evaluate(const Dual *d, const PetscReal c[], PetscReal gradient[], PetscReal hessian[],
-                          PetscReal *size)
+static PetscReal ROMFloatingEvaluate(const Dual *d, const PetscReal c[], PetscReal gradient[], PetscReal hessian[],
+                                     PetscReal *size)
 {
   const PetscInt p = d->p;
   PetscReal value = 0;
@@ -262,7 +263,7 @@ static PetscReal Evaluate(const Dual *d, const PetscReal c[], PetscReal gradient
 /* Minimises the dual function from c = 0. *met: the works agree. Newton's method with Armijo's line search (Nocedal
    and Wright, Numerical Optimization, algorithm 3.1): the dual of an entropy is convex and smooth, and has no
    constraint. */
-static PetscErrorCode Minimise(const Dual *d, PetscReal c[], PetscBool *met)
+static PetscErrorCode ROMFloatingMinimise(const Dual *d, PetscReal c[], PetscBool *met)
 {
   const PetscInt p = d->p;
   PetscReal *gradient, *hessian, *inverse, *step, *trial, size, value;
@@ -271,7 +272,7 @@ static PetscErrorCode Minimise(const Dual *d, PetscReal c[], PetscBool *met)
   *met = PETSC_FALSE;
   PetscCall(PetscArrayzero(c, p));
   PetscCall(PetscMalloc5(p, &gradient, p * p, &hessian, p * p, &inverse, p, &step, p, &trial));
-  value = Evaluate(d, c, gradient, hessian, &size);
+  value = ROMFloatingEvaluate(d, c, gradient, hessian, &size);
   for (PetscInt its = 0; its < ITERATIONS; its++) {
     PetscReal most = 0, slope = 0, t = 1, next;
 
@@ -289,7 +290,7 @@ static PetscErrorCode Minimise(const Dual *d, PetscReal c[], PetscBool *met)
       /* Armijo's condition; below, t is halved already, hence 2 t. exp() may overflow to infinity, which `!(<=)`
          refuses. */
       for (PetscInt i = 0; i < p; i++) trial[i] = c[i] + t * step[i];
-      next = Evaluate(d, trial, gradient, hessian, &size);
+      next = ROMFloatingEvaluate(d, trial, gradient, hessian, &size);
       t /= 2;
     } while (!(next <= value + 1e-4 * 2 * t * slope + 1e-14 * PetscAbsReal(value)) && t > 1e-6);
     if (!(t > 1e-6)) break;
@@ -300,9 +301,9 @@ static PetscErrorCode Minimise(const Dual *d, PetscReal c[], PetscBool *met)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the forces' works miss of the loads' (size: of their terms), relative to the terms of each motion. Without a load terms may be
-   round-off of the forces, where none acts along the motion. */
-static PetscReal Imbalance(const Dual *d, const PetscReal size[])
+/* What the forces' works miss of the loads' (size: of their terms), relative to the terms of each motion. Without a
+   load terms may be round-off of the forces, where none acts along the motion. */
+static PetscReal ROMFloatingImbalance(const Dual *d, const PetscReal size[])
 {
   PetscReal most = 0, reach = 0, all = 0;
 
@@ -341,8 +342,8 @@ PetscErrorCode HycoFloatingBalance(HycoROM m)
   d.load = load;
   PetscCall(LoadWork(m, f, m->fe->mu, load, size, &found));
   if (found) PetscCall(FillDual(m, fe, &d));
-  if (found) m->corrected = PetscMax(m->corrected, Imbalance(&d, size));
-  if (d.n) PetscCall(Minimise(&d, c, &met));
+  if (found) m->corrected = PetscMax(m->corrected, ROMFloatingImbalance(&d, size));
+  if (d.n) PetscCall(ROMFloatingMinimise(&d, c, &met));
   /* Only if all works agree: forces in between would be neither the model's nor in balance. */
   for (PetscInt k = 0; met && k < d.n; k++) {
     PetscReal power = 0;
@@ -350,7 +351,7 @@ PetscErrorCode HycoFloatingBalance(HycoROM m)
     for (PetscInt j = 0; j < d.p; j++) power += c[j] * d.work[k * d.p + j];
     m->Lambda[d.contact[k]] *= PetscExpReal(power);
   }
-  if (found) m->imbalance = PetscMax(m->imbalance, Imbalance(&d, size));
+  if (found) m->imbalance = PetscMax(m->imbalance, ROMFloatingImbalance(&d, size));
   PetscCall(PetscFree5(load, size, c, d.contact, d.work));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,9 +1,9 @@
 /*
-  The gradient of a prediction. A type's problem is w = q + M z, z = (x, L); with the set of closed contacts M z' + q' = 0
-  there, with q' the change of w at fixed z. A type with the op `beside` has q' and the derivatives of its fields from those
-  of its data, at the closed contacts alone; of others q' is a difference of w, and the fields are those of a moved state.
-  An output's derivative is its difference along mu + h and z + h z' together. Outputs are measured on the cells that decide
-  them.
+  The gradient of a prediction. A type's problem is w = q + M z, z = (x, L); with the set of closed contacts M z' + q' =
+  0 there, with q' the change of w at fixed z. A type with the op `perturbed` has q' and the derivatives of its fields
+  from those of its data, at the closed contacts alone; of others q' is a difference of w, and the fields are those of a
+  moved state. An output's derivative is its difference along mu + h and z + h z' together. Outputs are measured on the
+  cells that decide them.
 */
 #include <hycogradient.h>
 #include <hycolcp.h>
@@ -34,7 +34,7 @@ typedef struct {
   PetscBool regular;  /* the forces of the closed contacts are unique */
   PetscBool focused;  /* the outputs' cells are few */
   PetscBool contacts; /* outputs read contacts alone, and the forces are those of z */
-  PetscBool forces;   /* of a type with `beside`: outputs need no displacements */
+  PetscBool forces;   /* of a type with `perturbed`: outputs need no displacements */
   HycoTangent tangent;
   PetscReal *output; /* 6 x n_outputs: at the three points, at closer ones */
   /* the prediction */
@@ -47,7 +47,7 @@ typedef struct {
 
 /* The state of z at mu (NULL: the data are there), as a prediction would leave it. In the order of a
    prediction: the floating bodies' balance changes forces that the reconstruction has set. */
-static PetscErrorCode Move(Work *o, const PetscReal mu[], const PetscReal z[])
+static PetscErrorCode ROMGradientMove(Work *o, const PetscReal mu[], const PetscReal z[])
 {
   HycoROM m = o->m;
   const PetscReal imbalance = m->imbalance, corrected = m->corrected;
@@ -74,7 +74,7 @@ static PetscErrorCode MoveAndMeasure(Work *o, const PetscReal mu[], const PetscR
     if (mu) PetscCall(HycoROMBringRows(o->m, mu));
     PetscCall(PetscArraycpy(o->m->Lambda, z + o->p, o->n));
   } else
-    PetscCall(Move(o, mu, z));
+    PetscCall(ROMGradientMove(o, mu, z));
   PetscCall(HycoROMMeasureQuantities(o->m, &p));
   PetscCall(PetscArraycpy(output, p.quantity, o->m->model->scene->n_quantities));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -129,8 +129,8 @@ static PetscErrorCode MeasureWithRows(Work *o, const PetscReal mu[], PetscReal s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same with what of the contacts and prescribed displacements the parameter changes on one side, where most often it
-   is. */
+/* The same with what of the contacts and prescribed displacements the parameter changes on one side, where most often
+   it is. */
 static PetscErrorCode MeasureNear(Work *o, const PetscReal mu[], PetscReal step, PetscReal output[])
 {
   PetscBool there;
@@ -157,7 +157,7 @@ static PetscErrorCode MeasureNear(Work *o, const PetscReal mu[], PetscReal step,
 }
 
 /* The outputs at mu of the state moved by step times its change. */
-static PetscErrorCode Measure(void *context, const PetscReal mu[], PetscReal step, PetscReal output[])
+static PetscErrorCode ROMGradientMeasure(void *context, const PetscReal mu[], PetscReal step, PetscReal output[])
 {
   Work *o = (Work *)context;
 
@@ -172,7 +172,7 @@ static PetscErrorCode Measure(void *context, const PetscReal mu[], PetscReal ste
 }
 
 /* The derivative's matrix, of the closed and the undecided contacts. */
-static PetscErrorCode Close(Work *o)
+static PetscErrorCode ROMGradientClose(Work *o)
 {
   PetscReal *M, *L, *w, most = 0;
   const size_t n = (size_t)(o->p + o->k);
@@ -203,9 +203,9 @@ static PetscErrorCode Close(Work *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The problem, of the contacts that are closed or undecided alone; of all where outputs see open ones: the least pressure,
-   and that of nodes without area. */
-static PetscErrorCode Focus(Work *o)
+/* The problem, of the contacts that are closed or undecided alone; of all where outputs see open ones: the least
+   pressure, and that of nodes without area. */
+static PetscErrorCode ROMGradientFocus(Work *o)
 {
   HycoROM m = o->m;
   const HycoScene scene = m->model->scene;
@@ -240,8 +240,8 @@ static PetscErrorCode Focus(Work *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Keeps the prediction: differences move the model's state, and Restore() puts it back. */
-static PetscErrorCode Create(Work *o)
+/* Keeps the prediction: differences move the model's state, and ROMGradientRestore() puts it back. */
+static PetscErrorCode ROMGradientCreate(Work *o)
 {
   HycoROM m = o->m;
   const PetscInt n_dof = m->model->mesh->n_nodes * m->model->mesh->dim;
@@ -269,20 +269,20 @@ static PetscErrorCode Create(Work *o)
   PetscCall(PetscCalloc1(6 * m->model->scene->n_quantities + 1, &o->output));
   PetscUseTypeMethod(m, unknowns, &o->p, &o->n, o->z);
   if (o->past)
-    PetscUseTypeMethod(m, rest, &o->row, o->w[0], &largest);
+    PetscUseTypeMethod(m, step_residual, &o->row, o->w[0], &largest);
   else
     PetscCall((*m->ops->residual)(m, NULL, o->z, o->w[0], &largest));
   o->size = largest;
   for (PetscInt i = 0; i < o->n; i++) {
     /* Closed or undecided contacts; open ones do not change at first order. */
-    if (o->row || HycoTangentMayTouch(o->z[o->p + i], o->w[0][o->p + i], o->size)) o->contact[o->k++] = i;
+    if (o->row || HycoTangentMayClose(o->z[o->p + i], o->w[0][o->p + i], o->size)) o->contact[o->k++] = i;
   }
   /* The tangent is factored once, for all parameters. */
   o->regular = PETSC_TRUE;
-  if (!o->row) PetscCall(Close(o));
+  if (!o->row) PetscCall(ROMGradientClose(o));
   if (!o->regular) PetscFunctionReturn(PETSC_SUCCESS);
   if (o->passing) {
-    PetscCall(Focus(o));
+    PetscCall(ROMGradientFocus(o));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (m->measured)
@@ -293,14 +293,14 @@ static PetscErrorCode Create(Work *o)
      theorem. */
   o->focused = HycoROMPathIsFocused(m);
   if (!o->focused) PetscCall(HycoROMFocusOutputs(m, o->output, &o->focused));
-  /* Of a type without `beside` the values of fewer terms, whose round-off is that of the differences. */
-  if (o->focused && !m->ops->beside) PetscCall(MoveAndMeasure(o, NULL, o->z, o->output));
-  if (m->ops->beside) PetscCall(Focus(o));
+  /* Of a type without `perturbed` the values of fewer terms, whose round-off is that of the differences. */
+  if (o->focused && !m->ops->perturbed) PetscCall(MoveAndMeasure(o, NULL, o->z, o->output));
+  if (m->ops->perturbed) PetscCall(ROMGradientFocus(o));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Also after an error in Create(): arrays that do not exist yet are NULL. */
-static PetscErrorCode Destroy(Work *o)
+/* Also after an error in ROMGradientCreate(): arrays that do not exist yet are NULL. */
+static PetscErrorCode ROMGradientDestroy(Work *o)
 {
   PetscFunctionBegin;
   PetscCall(HycoTangentDestroy(&o->tangent));
@@ -313,7 +313,7 @@ static PetscErrorCode Destroy(Work *o)
 
 /* Whether the gap of a closed contact has different slopes to the two sides: its master changes. closer: the gaps
    nearer to mu are known too; otherwise it may be curvature. */
-static PetscBool Turns(const Work *o, const HycoDifference *d, PetscBool closer)
+static PetscBool MasterChanges(const Work *o, const HycoDifference *d, PetscBool closer)
 {
   PetscReal most = 0, slope = 0;
 
@@ -340,7 +340,7 @@ static PetscBool Turns(const Work *o, const HycoDifference *d, PetscBool closer)
 }
 
 /* w at point j of the difference, and at its closer ones. */
-static PetscErrorCode Beside(Work *o, const HycoDifference *d, PetscInt point, PetscInt j)
+static PetscErrorCode ROMGradientPerturbedResidual(Work *o, const HycoDifference *d, PetscInt point, PetscInt j)
 {
   HycoROM m = o->m;
   PetscReal at[HYCO_MAX_PARAMETERS], size;
@@ -348,30 +348,30 @@ static PetscErrorCode Beside(Work *o, const HycoDifference *d, PetscInt point, P
   PetscFunctionBegin;
   HycoDifferencePoint(d, m->model->scene, o->mu, point, at);
   if (o->near && !o->rows)
-    PetscCall((*m->ops->beside)(m, at, o->n, o->list, PETSC_FALSE, o->z, o->at[j], o->w[j]));
+    PetscCall((*m->ops->perturbed)(m, at, o->n, o->list, PETSC_FALSE, o->z, o->at[j], o->w[j]));
   else if (o->near) {
     HycoROMExchange(m, point - 1);
-    HycoFinally((*m->ops->beside)(m, at, o->n, o->list, PETSC_TRUE, o->z, o->at[j], o->w[j]),
+    HycoFinally((*m->ops->perturbed)(m, at, o->n, o->list, PETSC_TRUE, o->z, o->at[j], o->w[j]),
                 HycoROMExchange(m, point - 1));
   } else
     PetscCall((*m->ops->residual)(m, at, o->z, o->w[j], &size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same, with the gaps nearer to mu only where they are needed: d becomes closer, so that its points are on this side of
-   a change of masters farther away. */
+/* The same, with the gaps nearer to mu only where they are needed: d becomes closer, so that its points are on this
+   side of a change of masters farther away. */
 static PetscErrorCode FindTurns(Work *o, HycoDifference *d, PetscBool *turns)
 {
   PetscFunctionBegin;
   for (PetscInt k = 0; k < HYCO_GRADIENT_CLOSER; k++) {
     HycoDifference near = *d;
 
-    *turns = Turns(o, d, PETSC_FALSE);
+    *turns = MasterChanges(o, d, PETSC_FALSE);
     if (!*turns) break;
     /* A jump of the slope stays when the step shrinks, curvature does not. */
     HycoDifferenceShrink(&near);
-    for (PetscInt j = 1; j < 3; j++) PetscCall(Beside(o, &near, j, 2 + j));
-    *turns = Turns(o, d, PETSC_TRUE);
+    for (PetscInt j = 1; j < 3; j++) PetscCall(ROMGradientPerturbedResidual(o, &near, j, 2 + j));
+    *turns = MasterChanges(o, d, PETSC_TRUE);
     for (PetscInt j = 1; j < 3; j++) {
       PetscReal *w = o->w[j];
       const PetscInt number = o->at[j];
@@ -386,14 +386,14 @@ static PetscErrorCode FindTurns(Work *o, HycoDifference *d, PetscBool *turns)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* dz along a parameter. By the implicit function theorem: z moves so that the residual stays 0. The residual's change along
-   mu is a difference of three evaluations, exact up to second order. */
-static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *kink)
+/* dz along a parameter. By the implicit function theorem: z moves so that the residual stays 0. The residual's change
+   along mu is a difference of three evaluations, exact up to second order. */
+static PetscErrorCode ROMGradientDifferentiate(Work *o, HycoDifference *d, PetscBool *kink)
 {
   PetscBool turns;
 
   PetscFunctionBegin;
-  for (PetscInt j = 1; j < 3; j++) PetscCall(Beside(o, d, j, j));
+  for (PetscInt j = 1; j < 3; j++) PetscCall(ROMGradientPerturbedResidual(o, d, j, j));
   PetscCall(FindTurns(o, d, &turns));
   /* A one-sided difference: across the change of masters the central one is of neither side. */
   if (turns) HycoDifferenceTakeSide(d);
@@ -405,7 +405,7 @@ static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *kink)
   }
   if (o->row) {
     /* Of other masters, or states on the border, there are the differences. */
-    PetscCall((*o->m->ops->along)(o->m, d->parameter, d->weight, o->at, o->q, o->dz, &o->regular));
+    PetscCall((*o->m->ops->sensitivity)(o->m, d->parameter, d->weight, o->at, o->q, o->dz, &o->regular));
     *kink = turns;
     o->regular = (PetscBool)(o->regular && !turns);
     if (!o->regular) PetscFunctionReturn(PETSC_SUCCESS);
@@ -418,7 +418,7 @@ static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *kink)
   if (o->near && !o->forces)
     PetscCall(
         (*o->m->ops->slope)(o->m, o->n, o->list, d->weight + 1, o->at + 1, o->dz, o->modes, o->dofs, o->dgamma, o->dU));
-  if (o->past) PetscCall(HycoROMOutputsAlong(o->m, o->mu, d, o->dgamma, o->dU, &o->regular));
+  if (o->past) PetscCall(HycoROMOutputsSensitivity(o->m, o->mu, d, o->dgamma, o->dU, &o->regular));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -439,9 +439,9 @@ static void TakeChanges(Work *o, PetscInt p, PetscBool *nodes)
   o->disturbed = (PetscBool)(o->disturbed || o->means || o->moved_means);
 }
 
-/* All columns. First those of parameters that the outputs' cells do not have; last those that move nodes: the way back from
-   one's points is a part of the way to the next one's. */
-static PetscErrorCode Columns(Work *o, HycoGradientStore *store, HycoGradient *gradient)
+/* All columns. First those of parameters that the outputs' cells do not have; last those that move nodes: the way back
+   from one's points is a part of the way to the next one's. */
+static PetscErrorCode ROMGradientColumns(Work *o, HycoGradientStore *store, HycoGradient *gradient)
 {
   HycoROM m = o->m;
 
@@ -454,22 +454,22 @@ static PetscErrorCode Columns(Work *o, HycoGradientStore *store, HycoGradient *g
     TakeChanges(o, p, &nodes);
     if ((nodes ? 2 : o->enters || o->means) != k / gradient->n_parameters) continue;
     HycoDifferenceSet(m->model->scene, o->mu, p, HYCO_GRADIENT_STEP, &d);
-    PetscCall(Differentiate(o, &d, &kink));
+    PetscCall(ROMGradientDifferentiate(o, &d, &kink));
     if (!o->regular || o->passing) continue;
-    PetscCall(HycoGradientColumn(gradient, store, m->model->scene, o->mu, &d, kink, Measure, o, o->output));
+    PetscCall(HycoGradientColumn(gradient, store, m->model->scene, o->mu, &d, kink, ROMGradientMeasure, o, o->output));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The model's data and state are again those of the prediction. U after HycoROMComplete(), which would overwrite
    it with the modes' values. */
-static PetscErrorCode Restore(Work *o)
+static PetscErrorCode ROMGradientRestore(Work *o)
 {
   HycoROM m = o->m;
 
   PetscFunctionBegin;
   if (o->focused && !HycoROMPathIsFocused(m)) PetscCall(HycoROMUnfocusOutputs(m));
-  if (!o->near) PetscCall(Move(o, o->mu, o->z));
+  if (!o->near) PetscCall(ROMGradientMove(o, o->mu, o->z));
   m->prediction = o->prediction;
   /* Also what getters of the prediction read: the gradient must not be visible in them. */
   m->remainder = o->remainder;
@@ -485,7 +485,7 @@ static PetscErrorCode Restore(Work *o)
 }
 
 /* Refusals before any work: friction and histories have derivatives of the path, not of a point. */
-static PetscErrorCode Check(HycoROM m)
+static PetscErrorCode ROMGradientCheck(HycoROM m)
 {
   PetscFunctionBegin;
   PetscCall(HycoGradientCheckScene(m->model->scene));
@@ -506,15 +506,15 @@ PetscErrorCode HycoROMStateGradient(HycoROM m, HycoGradientStore *store, HycoGra
   PetscFunctionBegin;
   o.past = (PetscBool)(m->model->scene->n_times && (o.friction || HycoSceneFlows(m->model->scene)));
   PetscCall(HycoROMComplete(m));
-  ierr = Create(&o);
+  ierr = ROMGradientCreate(&o);
   if (!ierr && o.regular) {
     if (o.tangent) gradient->n_undecided = HycoTangentUndecided(o.tangent);
-    ierr = Columns(&o, store, gradient);
-    if (!ierr) ierr = Restore(&o);
+    ierr = ROMGradientColumns(&o, store, gradient);
+    if (!ierr) ierr = ROMGradientRestore(&o);
   }
   *regular = o.regular;
   /* Before the error is raised, so that a program that catches it leaks nothing. */
-  PetscCall(Destroy(&o));
+  PetscCall(ROMGradientDestroy(&o));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -527,7 +527,7 @@ PetscErrorCode HycoROMGetGradient(HycoROM m, HycoGradient *gradient)
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   HycoCheckGiven(gradient);
-  PetscCall(Check(m));
+  PetscCall(ROMGradientCheck(m));
   if (m->model->scene->n_times) {
     PetscCall(HycoROMPathGradient(m, gradient));
     PetscFunctionReturn(PETSC_SUCCESS);

@@ -30,7 +30,7 @@ PetscErrorCode HycoMeshMoveGroupNames(HycoH5 h, const char name[], HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static const char *At(const char prefix[], const char name[], char path[128])
+static const char *MeshFileEntry(const char prefix[], const char name[], char path[128])
 {
   (void)snprintf(path, 128, "%s/%s", prefix, name);
   return path;
@@ -50,28 +50,31 @@ PetscErrorCode HycoMeshMove(HycoH5 h, const char prefix[], PetscInt n_bodies, Hy
   m = *mesh;
   head[0] = (PetscInt)m->type;
   head[1] = m->dim;
-  PetscCall(HycoH5Ints(h, At(prefix, "head", path), 0, HYCO_N_MESH_TYPES - 1, 2, head));
+  PetscCall(HycoH5Ints(h, MeshFileEntry(prefix, "head", path), 0, HYCO_N_MESH_TYPES - 1, 2, head));
   /* Everything below has sizes that follow from type and dimension. */
   m->type = (HycoCellType)head[0];
   m->dim = HycoElementGet(m->type)->dim;
   m->nv = HycoElementGet(m->type)->nv;
   m->nf = HycoElementGetFacet(m->type)->nv;
-  PetscCall(HycoH5Real(h, At(prefix, "xyz", path), &m->n_nodes, 3, &m->xyz));
+  PetscCall(HycoH5Real(h, MeshFileEntry(prefix, "xyz", path), &m->n_nodes, 3, &m->xyz));
   /* Each array of indices is checked against the size that was read before it: a damaged file is refused, not
      followed. */
   last = m->n_nodes - 1;
-  PetscCall(HycoH5Int(h, At(prefix, "node_id", path), 0, PETSC_MAX_INT, &m->n_nodes, 1, &m->node_id));
-  PetscCall(HycoH5Int(h, At(prefix, "node_body", path), 0, n_bodies - 1, &m->n_nodes, 1, &m->node_body));
-  PetscCall(HycoH5Int(h, At(prefix, "cells", path), 0, last, &m->n_cells, m->nv, &m->cells));
-  PetscCall(HycoH5Int(h, At(prefix, "cell_id", path), 0, PETSC_MAX_INT, &m->n_cells, 1, &m->cell_id));
-  PetscCall(HycoH5Int(h, At(prefix, "cell_body", path), 0, n_bodies - 1, &m->n_cells, 1, &m->cell_body));
-  PetscCall(HycoH5Int(h, At(prefix, "facets", path), 0, last, &m->n_facets, m->nf, &m->facets));
-  PetscCall(HycoH5Int(h, At(prefix, "group_dim", path), 0, 3, &m->n_groups, 1, &m->group_dim));
-  PetscCall(HycoMeshMoveGroupNames(h, At(prefix, "group_name", path), m));
-  PetscCall(HycoH5Starts(h, At(prefix, "group_start", path), m->n_groups, &m->group_start));
-  PetscCall(HycoH5Int(h, At(prefix, "group_node", path), 0, last, &m->group_start[m->n_groups], 1, &m->group_node));
-  PetscCall(HycoH5Int(h, At(prefix, "facet_group", path), 0, m->n_groups - 1, &m->n_facets, 1, &m->facet_group));
-  PetscCall(HycoH5Int(h, At(prefix, "facet_cell", path), -1, m->n_cells - 1, &m->n_facets, 1, &m->facet_cell));
+  PetscCall(HycoH5Int(h, MeshFileEntry(prefix, "node_id", path), 0, PETSC_MAX_INT, &m->n_nodes, 1, &m->node_id));
+  PetscCall(HycoH5Int(h, MeshFileEntry(prefix, "node_body", path), 0, n_bodies - 1, &m->n_nodes, 1, &m->node_body));
+  PetscCall(HycoH5Int(h, MeshFileEntry(prefix, "cells", path), 0, last, &m->n_cells, m->nv, &m->cells));
+  PetscCall(HycoH5Int(h, MeshFileEntry(prefix, "cell_id", path), 0, PETSC_MAX_INT, &m->n_cells, 1, &m->cell_id));
+  PetscCall(HycoH5Int(h, MeshFileEntry(prefix, "cell_body", path), 0, n_bodies - 1, &m->n_cells, 1, &m->cell_body));
+  PetscCall(HycoH5Int(h, MeshFileEntry(prefix, "facets", path), 0, last, &m->n_facets, m->nf, &m->facets));
+  PetscCall(HycoH5Int(h, MeshFileEntry(prefix, "group_dim", path), 0, 3, &m->n_groups, 1, &m->group_dim));
+  PetscCall(HycoMeshMoveGroupNames(h, MeshFileEntry(prefix, "group_name", path), m));
+  PetscCall(HycoH5Starts(h, MeshFileEntry(prefix, "group_start", path), m->n_groups, &m->group_start));
+  PetscCall(HycoH5Int(h, MeshFileEntry(prefix, "group_node", path), 0, last, &m->group_start[m->n_groups], 1,
+                      &m->group_node));
+  PetscCall(
+      HycoH5Int(h, MeshFileEntry(prefix, "facet_group", path), 0, m->n_groups - 1, &m->n_facets, 1, &m->facet_group));
+  PetscCall(
+      HycoH5Int(h, MeshFileEntry(prefix, "facet_cell", path), -1, m->n_cells - 1, &m->n_facets, 1, &m->facet_cell));
   if (!HycoH5Reads(h)) PetscFunctionReturn(PETSC_SUCCESS);
   /* Derived: a collapsed cell has repeated nodes. */
   for (PetscInt e = 0; e < m->n_cells; e++) m->mixed = (PetscBool)(m->mixed || HycoMeshShape(m, e) != m->type);

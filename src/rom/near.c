@@ -1,5 +1,5 @@
-/* A few contacts near a prediction, for its derivatives: moved on an fe of their own, they leave the prediction's rows, and
-   what is kept with these, in place. */
+/* A few contacts near a prediction, for its derivatives: moved on an fe of their own, they leave the prediction's rows,
+   and what is kept with these, in place. */
 #include <hycoromimpl.h>
 
 static PetscErrorCode DropContacts(HycoNear *near)

@@ -17,10 +17,10 @@ struct _n_HycoOutputCells {
   HycoMesh mesh; /* with these cells */
   HycoFE fe;
   PetscReal *V, *u, *sigma; /* n_dof x l; n_dof; n_cells x n_sigma */
-  PetscReal *means;         /* of HycoFEStressKept() */
+  PetscReal *means;         /* of HycoFEStressMatrixKept() */
   PetscBool *stressed;      /* by cell: sigma is needed there, elsewhere it is 0 */
   PetscInt *fe_at;          /* by full-order displacement: its index in u; -1: none */
-  PetscBool *torn;          /* by node of the model's mesh: its displacement is exact, and a cell whose stress is needed
+  PetscBool *discontinuous; /* by node of the model's mesh: its displacement is exact, and a cell whose stress is needed
                                 has modes at others; NULL: not a type with exact displacements beside modes */
   PetscBool *without;       /* n_quantities: means that are not measured here, but known by their slopes; NULL: none */
   PetscReal *slope;         /* n_quantities x (l + n_fe): of these, by gamma and by full-order displacements */
@@ -51,13 +51,13 @@ PetscErrorCode HycoOutputCellsDestroy(HycoOutputCells *cells)
               &(*cells)->beside);
   PetscCall(HycoMeshDestroy(&(*cells)->mesh));
   HycoFreeAll(&(*cells)->V, &(*cells)->u, &(*cells)->sigma, &(*cells)->means, &(*cells)->stressed, &(*cells)->fe_at,
-              &(*cells)->torn, &(*cells)->without, &(*cells)->slope, &(*cells)->held, &(*cells)->u0,
+              &(*cells)->discontinuous, &(*cells)->without, &(*cells)->slope, &(*cells)->held, &(*cells)->u0,
               &(*cells)->reaction, &(*cells)->surface_node, cells);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The numbers of the cells that are needed. */
-static PetscErrorCode List(PetscInt n_cells, const PetscBool needed[], PetscInt *n, PetscInt keep[])
+static PetscErrorCode OutputCellsList(PetscInt n_cells, const PetscBool needed[], PetscInt *n, PetscInt keep[])
 {
   PetscFunctionBegin;
   *n = 0;
@@ -68,7 +68,7 @@ static PetscErrorCode List(PetscInt n_cells, const PetscBool needed[], PetscInt 
 }
 
 /* Sets mesh and V from the whole mesh. */
-static PetscErrorCode Extract(HycoROM m, HycoOutputCells p)
+static PetscErrorCode OutputCellsExtract(HycoROM m, HycoOutputCells p)
 {
   const PetscInt width = m->model->whole->dim * m->model->l;
   PetscBool *needed;
@@ -78,7 +78,7 @@ static PetscErrorCode Extract(HycoROM m, HycoOutputCells p)
   PetscCall(PetscMalloc2(m->model->whole->n_cells, &needed, m->model->whole->n_cells, &keep));
   /* Only cells that some output reads, and those around their nodes: the other modes are not copied. */
   PetscCall(HycoQuantitiesMarkCells(m->model->scene, m->model->whole, needed));
-  PetscCall(List(m->model->whole->n_cells, needed, &n, keep));
+  PetscCall(OutputCellsList(m->model->whole->n_cells, needed, &n, keep));
   PetscCall(HycoSubmesh(m->model->scene, m->model->whole, n, keep, 0, NULL, 0, NULL, &p->mesh));
   PetscCall(PetscFree2(needed, keep));
   PetscCall(PetscMalloc1(p->mesh->n_nodes * width, &p->V));
@@ -151,7 +151,7 @@ static PetscErrorCode TakeContact(HycoROM m, HycoOutputCells p, const PetscReal 
 }
 
 /* f_int: NULL: for a prediction without a history. */
-static PetscErrorCode React(HycoROM m, HycoOutputCells p, const PetscReal f_int[], const PetscReal Lambda[])
+static PetscErrorCode OutputCellsReact(HycoROM m, HycoOutputCells p, const PetscReal f_int[], const PetscReal Lambda[])
 {
   PetscFunctionBegin;
   if (!p->reaction) PetscFunctionReturn(PETSC_SUCCESS);
@@ -169,22 +169,22 @@ static PetscErrorCode ReactPredicted(HycoROM m, HycoOutputCells p, const PetscRe
   if (HycoResultantsSuffice(m, p->resultants))
     PetscCall(PetscArrayzero(p->reaction, p->fe->n_dof));
   else
-    PetscCall(React(m, p, f_int, Lambda));
+    PetscCall(OutputCellsReact(m, p, f_int, Lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* p->torn. place[]: by node of the whole mesh, its number in these cells; -1: none. Contact forces beside such cells, of a
-   contact that training has not seen, move one side of the cell alone. */
-static PetscErrorCode FindTorn(HycoROM m, HycoOutputCells p, const PetscInt place[])
+/* p->torn. place[]: by node of the whole mesh, its number in these cells; -1: none. Contact forces beside such cells,
+   of a contact that training has not seen, move one side of the cell alone. */
+static PetscErrorCode FindDiscontinuous(HycoROM m, HycoOutputCells p, const PetscInt place[])
 {
   const PetscInt dim = p->fe->dim;
-  PetscBool *modes, *torn;
+  PetscBool *modes, *discontinuous;
 
   PetscFunctionBegin;
   if (!m->model->traits.uniform) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(p->fe->n_dof, &modes));
-  PetscCall(PetscCalloc1(p->mesh->n_nodes, &torn));
-  PetscCall(PetscCalloc1(m->model->mesh->n_nodes, &p->torn));
+  PetscCall(PetscCalloc1(p->mesh->n_nodes, &discontinuous));
+  PetscCall(PetscCalloc1(m->model->mesh->n_nodes, &p->discontinuous));
   for (PetscInt i = 0; i < p->fe->n_dof; i++) modes[i] = (PetscBool)!p->fe->fixed[i];
   for (PetscInt k = 0; k < m->model->n_fe; k++) {
     if (p->fe_at[k] >= 0) modes[p->fe_at[k]] = PETSC_FALSE;
@@ -194,20 +194,20 @@ static PetscErrorCode FindTorn(HycoROM m, HycoOutputCells p, const PetscInt plac
     PetscBool any = PETSC_FALSE;
 
     for (PetscInt j = 0; j < p->mesh->nv * dim; j++) any = (PetscBool)(any || modes[node[j / dim] * dim + j % dim]);
-    for (PetscInt v = 0; any && p->stressed[e] && v < p->mesh->nv; v++) torn[node[v]] = PETSC_TRUE;
+    for (PetscInt v = 0; any && p->stressed[e] && v < p->mesh->nv; v++) discontinuous[node[v]] = PETSC_TRUE;
   }
   for (PetscInt i = 0; i < m->model->mesh->n_nodes; i++) {
     const PetscInt at = place[m->model->mesh->node_whole[i]];
 
-    p->torn[i] = (PetscBool)(at >= 0 && torn[at]);
+    p->discontinuous[i] = (PetscBool)(at >= 0 && discontinuous[at]);
   }
-  HycoFreeAll(&torn, &modes);
+  HycoFreeAll(&discontinuous, &modes);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Once mesh and V are set. Full-order displacements replace the modes' at the unknowns that these cells share with
    the model's mesh. */
-static PetscErrorCode Fill(HycoROM m, HycoOutputCells p)
+static PetscErrorCode OutputCellsFill(HycoROM m, HycoOutputCells p)
 {
   const PetscInt dim = m->model->mesh->dim;
   PetscInt *place;
@@ -228,14 +228,14 @@ static PetscErrorCode Fill(HycoROM m, HycoOutputCells p)
 
     p->fe_at[k] = i < 0 ? -1 : i * dim + m->model->fe_dof[k] % dim;
   }
-  PetscCall(FindTorn(m, p, place));
+  PetscCall(FindDiscontinuous(m, p, place));
   PetscCall(PetscFree(place));
   PetscCall(PrepareReactions(m, p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Sets p->u from these coefficients and full-order displacements. */
-static void Displace(HycoROM m, HycoOutputCells p, const PetscReal gamma[], const PetscReal U_fe[])
+static void OutputCellsDisplace(HycoROM m, HycoOutputCells p, const PetscReal gamma[], const PetscReal U_fe[])
 {
   for (PetscInt k = 0; k < p->fe->n_dof; k++) {
     p->u[k] = p->fe->u0[k];
@@ -248,7 +248,7 @@ static void Displace(HycoROM m, HycoOutputCells p, const PetscReal gamma[], cons
 }
 
 /* The quantities for forces Lambda (of all contacts) and, where needed, p's fields (p: else NULL). */
-static PetscErrorCode Measure(HycoROM m, HycoOutputCells p, const PetscReal Lambda[], PetscReal value[])
+static PetscErrorCode OutputCellsMeasure(HycoROM m, HycoOutputCells p, const PetscReal Lambda[], PetscReal value[])
 {
   const HycoContactResult *contact = NULL;
 
@@ -270,13 +270,13 @@ static const PetscReal *ForcesAt(HycoROM m, PetscInt listed)
 static PetscErrorCode MeasurePredicted(HycoROM m, HycoOutputCells p, const PetscReal Lambda[], PetscReal value[])
 {
   PetscFunctionBegin;
-  PetscCall(Measure(m, p, Lambda, value));
+  PetscCall(OutputCellsMeasure(m, p, Lambda, value));
   if (p) PetscCall(HycoResultantsSet(m, p->resultants, p->fe->mu, Lambda, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Replays the laws from the first time to the last, and evaluates the quantities at the listed ones. */
-static PetscErrorCode March(HycoOutputCells p, HycoReplay *r)
+static PetscErrorCode OutputCellsTimeLoop(HycoOutputCells p, HycoReplay *r)
 {
   HycoROM m = r->m;
   HycoTrace *trace = &m->trace;
@@ -288,7 +288,8 @@ static PetscErrorCode March(HycoOutputCells p, HycoReplay *r)
   for (PetscInt k = 0, j = 0; k < trace->n; k++) {
     PetscCall(HycoReplayMove(r, k));
     if (p->mesh->n_cells <= KEPT) PetscCall(HycoFEKeepGradients(p->fe));
-    Displace(m, p, trace->gamma + (size_t)k * (size_t)m->model->l, trace->U_fe + (size_t)k * (size_t)m->model->n_fe);
+    OutputCellsDisplace(m, p, trace->gamma + (size_t)k * (size_t)m->model->l,
+                        trace->U_fe + (size_t)k * (size_t)m->model->n_fe);
     /* Every accepted step, because states depend on those before; outputs at the listed ones only. */
     PetscCall(HycoReplayStep(r, k, p->u));
     if (j == trace->n_listed || trace->at[j] != k) continue;
@@ -312,7 +313,7 @@ static void CollectPath(HycoROM m, HycoPrediction *out)
 }
 
 /* Sets p->u and p->sigma for a prediction without a history, on the cells at mu. */
-static PetscErrorCode Follow(HycoROM m, HycoOutputCells p, const PetscReal mu[])
+static PetscErrorCode OutputCellsReplay(HycoROM m, HycoOutputCells p, const PetscReal mu[])
 {
   PetscReal *U_fe;
 
@@ -320,11 +321,12 @@ static PetscErrorCode Follow(HycoROM m, HycoOutputCells p, const PetscReal mu[])
   PetscCall(PetscMalloc1(m->model->n_fe, &U_fe));
   for (PetscInt k = 0; k < m->model->n_fe; k++) U_fe[k] = m->U[m->model->fe_dof[k]];
   PetscCall(HycoFESetParameters(p->fe, mu));
-  Displace(m, p, m->gamma, U_fe);
+  OutputCellsDisplace(m, p, m->gamma, U_fe);
   PetscCall(PetscFree(U_fe));
-  /* Gradients are kept while no parameter moves the nodes; where stresses vary within cells, of each point of few cells. */
+  /* Gradients are kept while no parameter moves the nodes; where stresses vary within cells, of each point of few
+     cells. */
   if (p->fe->thermal && p->mesh->n_cells <= KEPT) PetscCall(HycoFEKeepGradients(p->fe));
-  PetscCall(HycoFEStressKept(p->fe, p->stressed, p->u, &p->means, p->sigma));
+  PetscCall(HycoFEStressMatrixKept(p->fe, p->stressed, p->u, &p->means, p->sigma));
   for (PetscInt i = 0; i < p->n_flow * p->fe->n_sigma; i++)
     p->sigma[p->flow[i / p->fe->n_sigma] * p->fe->n_sigma + i % p->fe->n_sigma] =
         p->flowing[i] + p->step * p->slopes[p->parameter * p->n_flow * p->fe->n_sigma + i];
@@ -333,7 +335,7 @@ static PetscErrorCode Follow(HycoROM m, HycoOutputCells p, const PetscReal mu[])
 }
 
 /* Created when fields are needed. */
-static PetscErrorCode Make(HycoROM m)
+static PetscErrorCode OutputCellsMake(HycoROM m)
 {
   PetscErrorCode ierr;
 
@@ -341,8 +343,8 @@ static PetscErrorCode Make(HycoROM m)
   if (m->output_cells || !HycoSceneHasFieldOutputs(m->model->scene)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoROMLoadWhole(m));
   PetscCall(PetscNew(&m->output_cells));
-  ierr = Extract(m, m->output_cells);
-  if (!ierr) ierr = Fill(m, m->output_cells);
+  ierr = OutputCellsExtract(m, m->output_cells);
+  if (!ierr) ierr = OutputCellsFill(m, m->output_cells);
   /* After the cells: resultants need the modes' forces there. */
   if (!ierr && HycoSceneHasReactions(m->model->scene)) ierr = HycoResultantsFind(m, &m->output_cells->resultants);
   if (ierr) PetscCall(HycoOutputCellsDestroy(&m->output_cells));
@@ -351,7 +353,7 @@ static PetscErrorCode Make(HycoROM m)
 }
 
 /* Ownership is taken before anything can fail, as the header says; `balanced` and `loaded` by
-   HycoResultantsCreate(), also after an error of Fill(). */
+   HycoResultantsCreate(), also after an error of OutputCellsFill(). */
 PetscErrorCode HycoROMSetOutputCells(HycoROM m, HycoMesh mesh, PetscReal V[], PetscBool balanced[], HycoMesh loaded)
 {
   PetscErrorCode ierr, taken = PETSC_SUCCESS;
@@ -362,7 +364,7 @@ PetscErrorCode HycoROMSetOutputCells(HycoROM m, HycoMesh mesh, PetscReal V[], Pe
   PetscCall(PetscNew(&m->output_cells));
   m->output_cells->mesh = mesh;
   m->output_cells->V = V;
-  if (!ierr) ierr = Fill(m, m->output_cells);
+  if (!ierr) ierr = OutputCellsFill(m, m->output_cells);
   if (balanced) taken = HycoResultantsCreate(m, balanced, loaded, &m->output_cells->resultants);
   if (ierr || taken) PetscCall(HycoOutputCellsDestroy(&m->output_cells));
   PetscCall(ierr);
@@ -384,7 +386,7 @@ static PetscErrorCode MeasureTimes(HycoROM m)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   ierr = HycoReplayBegin(m, m->output_cells->fe, &r);
-  if (!ierr) ierr = March(m->output_cells, &r);
+  if (!ierr) ierr = OutputCellsTimeLoop(m->output_cells, &r);
   PetscCall(HycoReplayEnd(&r));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -398,7 +400,7 @@ PetscErrorCode HycoROMMeasurePath(HycoROM m)
 
   PetscFunctionBegin;
   if (!m->model->scene->n_quantities || !trace->n_listed || trace->step) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Make(m));
+  PetscCall(OutputCellsMake(m));
   PetscCall(PetscMalloc1(trace->n_listed, &trace->step));
   PetscCall(PetscArraycpy(trace->step, trace->history.step, trace->n_listed));
   HycoOnError(MeasureTimes(m), PetscCall(PetscFree(trace->step)));
@@ -426,44 +428,44 @@ PetscErrorCode HycoROMMeasureQuantities(HycoROM m, HycoPrediction *out)
 PetscErrorCode HycoROMMeasureAt(HycoROM m, const PetscReal mu[], PetscReal value[])
 {
   PetscFunctionBegin;
-  PetscCall(Make(m));
-  if (m->output_cells) PetscCall(Follow(m, m->output_cells, mu));
+  PetscCall(OutputCellsMake(m));
+  if (m->output_cells) PetscCall(OutputCellsReplay(m, m->output_cells, mu));
   PetscCall(MeasurePredicted(m, m->output_cells, m->Lambda, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMShareTorn(HycoROM m, PetscReal *share)
+PetscErrorCode HycoROMShareDiscontinuous(HycoROM m, PetscReal *share)
 {
-  PetscReal sum = 0, torn = 0;
+  PetscReal sum = 0, discontinuous = 0;
 
   PetscFunctionBegin;
   *share = 0;
-  if (!m->output_cells || !m->output_cells->torn) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!m->output_cells || !m->output_cells->discontinuous) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     const PetscReal force = PetscMax(m->Lambda[k], 0);
     PetscBool any = PETSC_FALSE;
 
     if (force == 0) continue;
     for (PetscInt j = m->rows.start[k]; j < m->rows.start[k + 1]; j++)
-      any = (PetscBool)(any || m->output_cells->torn[m->rows.dof[j] / m->fe->dim]);
+      any = (PetscBool)(any || m->output_cells->discontinuous[m->rows.dof[j] / m->fe->dim]);
     sum += force;
-    torn += any ? force : 0;
+    discontinuous += any ? force : 0;
   }
-  if (sum > 0) *share = torn / sum;
+  if (sum > 0) *share = discontinuous / sum;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* -- few cells, near a prediction -- */
 
 /* Whether a mesh has a cell of the whole mesh; *at, ascending from call to call: where. */
-static PetscBool Find(HycoMesh mesh, PetscInt cell, PetscInt *at)
+static PetscBool OutputCellsFind(HycoMesh mesh, PetscInt cell, PetscInt *at)
 {
   while (*at < mesh->n_cells && mesh->cell_whole[*at] < cell) ++*at;
   return (PetscBool)(*at < mesh->n_cells && mesh->cell_whole[*at] == cell);
 }
 
-/* m->few with these cells of `all`; kept as long as it has the needed ones. A cell that is there for a displacement is one
-   of those of an extreme stress too: it has its own stress, and not 0. */
+/* m->few with these cells of `all`; kept as long as it has the needed ones. A cell that is there for a displacement is
+   one of those of an extreme stress too: it has its own stress, and not 0. */
 static PetscErrorCode MakeFew(HycoROM m, HycoOutputCells all, PetscInt n, const PetscInt keep[])
 {
   const PetscInt width = m->model->mesh->dim * m->model->l;
@@ -473,7 +475,8 @@ static PetscErrorCode MakeFew(HycoROM m, HycoOutputCells all, PetscInt n, const 
 
   PetscFunctionBegin;
   /* Nearby points decide by the same cells: the small mesh is made once for a whole gradient. */
-  for (PetscInt k = 0, at = 0; k < n && has; k++) has = Find(m->few->mesh, all->mesh->cell_whole[keep[k]], &at);
+  for (PetscInt k = 0, at = 0; k < n && has; k++)
+    has = OutputCellsFind(m->few->mesh, all->mesh->cell_whole[keep[k]], &at);
   if (has) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoOutputCellsDestroy(&m->few));
   PetscCall(PetscNew(&m->few));
@@ -486,7 +489,7 @@ static PetscErrorCode MakeFew(HycoROM m, HycoOutputCells all, PetscInt n, const 
   for (PetscInt i = 0; i < p->mesh->n_nodes; i++)
     PetscCall(PetscArraycpy(p->V + i * width, all->V + node[i] * width, width));
   PetscCall(PetscFree(node));
-  PetscCall(Fill(m, p));
+  PetscCall(OutputCellsFill(m, p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -498,7 +501,7 @@ static PetscBool StressChanges(const HycoBody *b, const PetscBool changed[])
 }
 
 /* Of the quantities that are measured in p (slopes: of the others). Reactions have loads, and the supports' springs. */
-static PetscBool Enters(HycoROM m, HycoOutputCells p, PetscBool slopes, const PetscBool changed[])
+static PetscBool OutputCellsEnters(HycoROM m, HycoOutputCells p, PetscBool slopes, const PetscBool changed[])
 {
   const HycoScene s = m->model->scene;
   const HycoOutputCells cells = slopes ? m->few : p;
@@ -549,8 +552,8 @@ void HycoROMParametersEnter(HycoROM m, const PetscBool changed[], PetscBool *mea
     *held = (PetscBool)(*held || (p->without[q] && HycoSceneSupportsChange(s, m->few->mesh, changed,
                                                                            HycoSceneChanges(s, changed).nodes)));
 
-  *measured = (PetscBool)(p && Enters(m, p, PETSC_FALSE, changed));
-  *slopes = (PetscBool)(p && Enters(m, p, PETSC_TRUE, changed));
+  *measured = (PetscBool)(p && OutputCellsEnters(m, p, PETSC_FALSE, changed));
+  *slopes = (PetscBool)(p && OutputCellsEnters(m, p, PETSC_TRUE, changed));
 }
 
 /* Other coefficients are 0 times what cells have of their modes. */
@@ -593,12 +596,12 @@ PetscErrorCode HycoROMChangeMeans(HycoROM m, const PetscReal mu[], const PetscRe
 }
 
 /* Of quantity q, in the cells of `all`. */
-static PetscErrorCode FindSlope(HycoROM m, HycoOutputCells all, PetscInt q, PetscReal slope[], PetscReal by[])
+static PetscErrorCode FindDerivative(HycoROM m, HycoOutputCells all, PetscInt q, PetscReal slope[], PetscReal by[])
 {
   const PetscInt l = m->model->l;
 
   PetscFunctionBegin;
-  PetscCall(HycoQuantityMeanSlope(all->fe, q, all->u, all->sigma, by));
+  PetscCall(HycoQuantityMeanDerivative(all->fe, q, all->u, all->sigma, by));
   PetscCall(PetscArrayzero(slope, l + m->model->n_fe));
   for (PetscInt i = 0; i < m->model->n_fe; i++) {
     if (all->fe_at[i] < 0 || all->fe->fixed[all->fe_at[i]]) continue;
@@ -625,15 +628,15 @@ PetscErrorCode HycoROMUnfocusOutputs(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Which quantities are known by their slopes: means. Tied and oblique unknowns follow from others, to which the slopes of
-   their own would have to be added. */
-static void ChooseSlopes(HycoROM m, HycoOutputCells p, PetscBool without[])
+/* Which quantities are known by their slopes: means. Tied and oblique unknowns follow from others, to which the slopes
+   of their own would have to be added. */
+static void ChooseDerivatives(HycoROM m, HycoOutputCells p, PetscBool without[])
 {
   const HycoScene s = m->model->scene;
   const PetscBool plain = (PetscBool)(!p->fe->n_oblique && !p->mesh->ties && !m->model->mesh->ties);
 
   for (PetscInt q = 0; q < s->n_quantities; q++)
-    without[q] = (PetscBool)(plain && m->ops->beside && s->quantity[q].kind == HYCO_QUANTITY_MEAN);
+    without[q] = (PetscBool)(plain && m->ops->perturbed && s->quantity[q].kind == HYCO_QUANTITY_MEAN);
 }
 
 /* The cells that decide the quantities in p, into m->few. */
@@ -647,7 +650,7 @@ static PetscErrorCode FindFew(HycoROM m, HycoOutputCells p, const PetscReal valu
   PetscCall(PetscMalloc2(p->mesh->n_cells, &needed, p->mesh->n_cells, &keep));
   ierr = HycoQuantitiesMarkDecisive(p->fe, p->u, p->sigma, value, without, HycoResultantsSuffice(m, p->resultants),
                                     needed);
-  if (!ierr) ierr = List(p->mesh->n_cells, needed, &n, keep);
+  if (!ierr) ierr = OutputCellsList(p->mesh->n_cells, needed, &n, keep);
   /* A mesh has a cell. */
   if (!ierr && !n) keep[n++] = 0;
   if (!ierr) ierr = MakeFew(m, p, n, keep);
@@ -669,7 +672,7 @@ PetscErrorCode HycoROMFocusOutputs(HycoROM m, const PetscReal value[], PetscBool
   PetscFunctionBegin;
   *focused = PETSC_FALSE;
   if (!p) PetscFunctionReturn(PETSC_SUCCESS);
-  ChooseSlopes(m, p, without);
+  ChooseDerivatives(m, p, without);
   PetscCall(FindFew(m, p, value, without));
   if (!m->few->without) {
     PetscCall(PetscMalloc1(n, &m->few->without));
@@ -680,7 +683,7 @@ PetscErrorCode HycoROMFocusOutputs(HycoROM m, const PetscReal value[], PetscBool
   PetscCall(PetscArraycpy(m->few->u0, p->fe->u0, p->fe->n_dof));
   PetscCall(PetscArraycpy(m->few->without, without, n));
   for (PetscInt q = 0; q < n; q++) {
-    if (without[q]) PetscCall(FindSlope(m, p, q, m->few->slope + q * width, m->few->held + q * p->fe->n_dof));
+    if (without[q]) PetscCall(FindDerivative(m, p, q, m->few->slope + q * width, m->few->held + q * p->fe->n_dof));
   }
   *focused = PETSC_TRUE;
   PetscCall(HycoROMUnfocusOutputs(m)); /* an exchange, its own inverse */
@@ -707,12 +710,12 @@ static PetscErrorCode FindFewOfPath(HycoROM m, HycoOutputCells p)
 
     HycoSceneSetTime(m->model->scene, m->fe->mu, trace->t[trace->at[j]], mu);
     PetscCall(HycoFESetParameters(p->fe, mu));
-    Displace(m, p, trace->gamma + (size_t)trace->at[j] * l, trace->U_fe + (size_t)trace->at[j] * n_fe);
+    OutputCellsDisplace(m, p, trace->gamma + (size_t)trace->at[j] * l, trace->U_fe + (size_t)trace->at[j] * n_fe);
     PetscCall(HycoQuantitiesMarkDecisive(p->fe, p->u, p->listed + (size_t)j * size, trace->step[j].quantity, without,
                                          HycoResultantsSuffice(m, p->resultants), at));
     for (PetscInt e = 0; e < p->mesh->n_cells; e++) needed[e] = (PetscBool)(needed[e] || at[e]);
   }
-  PetscCall(List(p->mesh->n_cells, needed, &n, keep));
+  PetscCall(OutputCellsList(p->mesh->n_cells, needed, &n, keep));
   if (!n) keep[n++] = 0; /* a mesh has a cell */
   PetscCall(MakeFew(m, p, n, keep));
   PetscCall(PetscFree3(at, needed, keep));
@@ -810,7 +813,8 @@ PetscErrorCode HycoROMOutputsStep(HycoROM m, PetscInt k)
     PetscCall(HycoFEPointsAccept(p->points));
   else
     PetscCall(HycoFEPointsBegin(p->points));
-  Displace(m, p, trace->gamma + (size_t)k * (size_t)m->model->l, trace->U_fe + (size_t)k * (size_t)m->model->n_fe);
+  OutputCellsDisplace(m, p, trace->gamma + (size_t)k * (size_t)m->model->l,
+                      trace->U_fe + (size_t)k * (size_t)m->model->n_fe);
   PetscCall(PetscArraycpy(p->along, p->u, p->fe->n_dof));
   PetscCall(HycoFEPointsStep(p->points, p->u, trace->t[PetscMax(k - 1, 0)], trace->t[k], NULL, NULL));
   TakeMeans(p, HycoFEPointsStress(p->points), p->flowing);
@@ -818,8 +822,8 @@ PetscErrorCode HycoROMOutputsStep(HycoROM m, PetscInt k)
 }
 
 /* The data of the laws at the points of a difference; u: the displacements of the step. */
-static PetscErrorCode TakeBeside(HycoROM m, HycoOutputCells p, const PetscReal mu[], const HycoDifference *d,
-                                 const PetscReal u[])
+static PetscErrorCode AcceptPerturbed(HycoROM m, HycoOutputCells p, const PetscReal mu[], const HycoDifference *d,
+                                      const PetscReal u[])
 {
   PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, enters, strains;
 
@@ -834,13 +838,13 @@ static PetscErrorCode TakeBeside(HycoROM m, HycoOutputCells p, const PetscReal m
     for (PetscInt i = 0; i < p->fe->n_dof && strains; i++) p->beside[i] = u[i] - p->fe->u0[i];
     if (enters) PetscCall(HycoFESetParameters(p->fe, at));
     for (PetscInt i = 0; i < p->fe->n_dof && strains; i++) p->beside[i] += p->fe->u0[i];
-    PetscCall(HycoFEPointsBeside(p->points, j, enters, strains ? p->beside : NULL));
+    PetscCall(HycoFEPointsPerturbed(p->points, j, enters, strains ? p->beside : NULL));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMOutputsAlong(HycoROM m, const PetscReal mu[], const HycoDifference *d, const PetscReal dgamma[],
-                                   const PetscReal dU[], PetscBool *smooth)
+PetscErrorCode HycoROMOutputsSensitivity(HycoROM m, const PetscReal mu[], const HycoDifference *d,
+                                         const PetscReal dgamma[], const PetscReal dU[], PetscBool *smooth)
 {
   static const PetscInt point[] = {0, 1, 2};
   const PetscInt l = m->model->l;
@@ -850,7 +854,7 @@ PetscErrorCode HycoROMOutputsAlong(HycoROM m, const PetscReal mu[], const HycoDi
   PetscFunctionBegin;
   *smooth = PETSC_TRUE;
   if (!HycoROMOutputsFlow(m)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(TakeBeside(m, p, mu, d, p->along));
+  PetscCall(AcceptPerturbed(m, p, mu, d, p->along));
   PetscCall(HycoFESetParameters(p->fe, mu));
   PetscCall(HycoFEKeepGradients(p->fe));
   for (PetscInt k = 0; k < p->fe->n_dof; k++) {
@@ -861,7 +865,7 @@ PetscErrorCode HycoROMOutputsAlong(HycoROM m, const PetscReal mu[], const HycoDi
     if (p->fe_at[k] >= 0) p->beside[p->fe_at[k]] = dU[m->model->fe_dof[k]];
   }
   PetscCall(PetscMalloc1(p->n_flow * HycoElementGet(p->mesh->type)->nq * p->fe->n_sigma, &stress));
-  PetscCall(HycoFEPointsSlope(p->points, d->parameter, d->weight, point, p->beside, NULL, stress, smooth));
+  PetscCall(HycoFEPointsDerivatives(p->points, d->parameter, d->weight, point, p->beside, NULL, stress, smooth));
   TakeMeans(p, stress, p->slopes + d->parameter * p->n_flow * p->fe->n_sigma);
   PetscCall(PetscFree(stress));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -908,12 +912,12 @@ PetscErrorCode HycoROMMeasureSolution(HycoROM m, const PetscReal mu[], const Pet
     PetscCall(HycoFESetParameters(p->fe, mu));
     PetscCall(PetscArraycpy(p->u, u, p->fe->n_dof));
     PetscCall(PetscArraycpy(p->sigma, sigma, p->mesh->n_cells * p->fe->n_sigma));
-    if (!m->trace.n_listed) PetscCall(React(m, p, NULL, Lambda));
+    if (!m->trace.n_listed) PetscCall(OutputCellsReact(m, p, NULL, Lambda));
     /* Reactions of a path need the internal forces, which a stored solution does not give: NaN marks them as
        unknown. */
     for (PetscInt k = 0; m->trace.n_listed && p->reaction && k < p->fe->n_dof; k++)
       p->reaction[k] = reaction ? reaction[k] : NAN;
   }
-  PetscCall(Measure(m, p, Lambda, value));
+  PetscCall(OutputCellsMeasure(m, p, Lambda, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

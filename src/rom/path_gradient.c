@@ -10,7 +10,7 @@ typedef struct {
 } Work;
 
 /* A HycoGradientFollow. */
-static PetscErrorCode Follow(void *context, const PetscReal mu[], const HycoStep *step[])
+static PetscErrorCode PathGradientFollow(void *context, const PetscReal mu[], const HycoStep *step[])
 {
   const Work *o = (const Work *)context;
   HycoTrace *trace = &o->m->trace;
@@ -30,7 +30,7 @@ static PetscErrorCode Follow(void *context, const PetscReal mu[], const HycoStep
   trace->given = before.given;
   PetscCall(ierr);
   PetscCall(HycoROMGetHistory(o->m, &history));
-  PetscCall(HycoPathCheckBeside(history.ended, trace->n_cuts, history.why));
+  PetscCall(HycoPathCheckPerturbed(history.ended, trace->n_cuts, history.why));
   *step = history.step;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -47,7 +47,7 @@ static PetscErrorCode TakeStep(HycoROM m, PetscInt k, PetscInt listed, PetscBool
     HycoSceneSetTime(m->model->scene, m->fe->mu, m->trace.t[k], mu);
     PetscCall(HycoROMBringRows(m, mu));
   }
-  PetscCall((*m->ops->stand)(m, k, listed, done));
+  PetscCall((*m->ops->linearise)(m, k, listed, done));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -62,8 +62,8 @@ static PetscErrorCode MeasureListed(HycoROM m, PetscInt listed)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* At the steps one after the other; without friction and flow these do not depend on each other, and those between the listed times
-   are left out. *done: false, where one has no derivative. */
+/* At the steps one after the other; without friction and flow these do not depend on each other, and those between the
+   listed times are left out. *done: false, where one has no derivative. */
 static PetscErrorCode AtTimes(HycoROM m, const HycoStep step[], HycoGradient *gradient, PetscBool *done)
 {
   const PetscInt n = gradient->n_outputs * gradient->n_parameters, n_listed = m->trace.n_listed;
@@ -106,7 +106,7 @@ static PetscErrorCode ByTimes(HycoROM m, const HycoStep step[], HycoGradient *gr
 
   PetscFunctionBegin;
   *done = PETSC_FALSE;
-  PetscTryTypeMethod(m, stand, -1, -1, &able);
+  PetscTryTypeMethod(m, linearise, -1, -1, &able);
   if (!able || (flows && !HycoROMOutputsFollow(m))) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoGradientCreate(m->model->scene, &m->gradient, gradient));
   if (flows) PetscCall(HycoROMFocusPath(m, &focused));
@@ -118,8 +118,8 @@ static PetscErrorCode ByTimes(HycoROM m, const HycoStep step[], HycoGradient *gr
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The path is predicted again at the end: the caller may ask for any of its results, which do not depend on the order of
-   predictions. */
+/* The path is predicted again at the end: the caller may ask for any of its results, which do not depend on the order
+   of predictions. */
 PetscErrorCode HycoROMPathGradient(HycoROM m, HycoGradient *gradient)
 {
   const PetscInt shown = m->trace.shown;
@@ -138,7 +138,7 @@ PetscErrorCode HycoROMPathGradient(HycoROM m, HycoGradient *gradient)
   PetscCall(PetscArraycpy(mu, m->fe->mu, m->model->scene->n_variables));
   o.n = history.n_taken;
   HycoDuplicate(o.n, history.taken, &o.taken);
-  ierr = HycoGradientOfPath(m->model->scene, mu, history.step, &m->gradient, gradient, Follow, &o);
+  ierr = HycoGradientOfPath(m->model->scene, mu, history.step, &m->gradient, gradient, PathGradientFollow, &o);
   if (!ierr) ierr = HycoROMPredict(m, m->model->scene->n_parameters, mu);
   if (!ierr) ierr = HycoROMSetStep(m, shown);
   /* The handle then has the results of a path beside the one that was asked for. */

@@ -91,8 +91,8 @@ static PetscErrorCode MeasureDisplacements(HycoROM m, HycoPrediction *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sliding, overlap and facing contacts of the prediction; dependent rows are counted only where surfaces are complete, since
-   an RID cuts rows off, and on paths at each listed time. */
+/* Sliding, overlap and facing contacts of the prediction; dependent rows are counted only where surfaces are complete,
+   since an RID cuts rows off, and on paths at each listed time. */
 static PetscErrorCode MeasureContacts(HycoROM m, HycoPrediction *p)
 {
   HycoContactState state;
@@ -246,7 +246,7 @@ PetscErrorCode HycoROMGetWholeU(HycoROM m, PetscInt *n_nodes, const PetscReal *U
 }
 
 /* The last prediction in the form for output. The caller frees `rid`. */
-static PetscErrorCode Look(HycoROM m, HycoSolution *solution, PetscReal **rid)
+static PetscErrorCode PredictionFields(HycoROM m, HycoSolution *solution, PetscReal **rid)
 {
   const PetscReal *U;
 
@@ -278,7 +278,7 @@ PetscErrorCode HycoROMWrite(HycoROM m, const char path[])
     PetscCall(HycoTraceWrite(m, path));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(Look(m, &solution, &rid));
+  PetscCall(PredictionFields(m, &solution, &rid));
   HycoFinally(HycoSolutionWrite(path, &solution), PetscCall(PetscFree(rid)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -291,7 +291,7 @@ static PetscErrorCode WritePoint(HycoROM m, const PetscReal mu[], HycoFieldFile 
 
   PetscFunctionBegin;
   PetscCall(HycoROMPredict(m, m->model->scene->n_parameters, mu));
-  PetscCall(Look(m, &solution, &rid));
+  PetscCall(PredictionFields(m, &solution, &rid));
   HycoFinally(HycoSolutionAdd(file, &solution), PetscCall(PetscFree(rid)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

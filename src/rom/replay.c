@@ -23,7 +23,7 @@ PetscErrorCode HycoReplayBegin(HycoROM m, HycoFE fe, HycoReplay *r)
   PetscFunctionBegin;
   *r = (HycoReplay){.m = m, .march.fe = fe};
   PetscCall(HycoReplayMove(r, 0)); /* the initial state depends on the first temperature */
-  PetscCall(HycoMarchBegin(fe, &r->march));
+  PetscCall(HycoTimeLoopBegin(fe, &r->march));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -34,7 +34,7 @@ PetscErrorCode HycoReplayTry(HycoReplay *r, PetscInt k, const PetscReal u[], Hyc
   const PetscReal *t = r->m->trace.t;
 
   PetscFunctionBegin;
-  PetscCall(HycoMarchStep(&r->march, u, t[PetscMax(k - 1, 0)], t[k], report));
+  PetscCall(HycoTimeLoopStep(&r->march, u, t[PetscMax(k - 1, 0)], t[k], report));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -53,12 +53,12 @@ PetscErrorCode HycoReplayStep(HycoReplay *r, PetscInt k, const PetscReal u[])
 PetscErrorCode HycoReplayEnd(HycoReplay *r)
 {
   PetscFunctionBegin;
-  PetscCall(HycoMarchEnd(&r->march));
+  PetscCall(HycoTimeLoopEnd(&r->march));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The fields of the series at listed time j, the current time of the replay. */
-static HycoSeriesSource Look(const HycoReplay *r, PetscInt j)
+static HycoSeriesSource ReplayFields(const HycoReplay *r, PetscInt j)
 {
   HycoROM m = r->m;
   /* On one process the whole mesh has the surfaces: one FE serves both. */
@@ -83,7 +83,7 @@ static HycoSeriesSource Look(const HycoReplay *r, PetscInt j)
 static PetscErrorCode WriteTimes(HycoReplay *r, HycoSeries series)
 {
   HycoROM m = r->m;
-  HycoSeriesSource from = Look(r, 0);
+  HycoSeriesSource from = ReplayFields(r, 0);
 
   PetscFunctionBegin;
   HycoTraceShow(m, 0);
@@ -96,7 +96,7 @@ static PetscErrorCode WriteTimes(HycoReplay *r, HycoSeries series)
     if (j == m->trace.n_listed || m->trace.at[j] != k) continue;
     /* The getters that the fields use read the selected time. */
     HycoTraceShow(m, j);
-    from = Look(r, j++);
+    from = ReplayFields(r, j++);
     PetscCall(HycoSeriesAddTime(series, &from));
   }
   PetscCall(HycoSeriesClose(series));

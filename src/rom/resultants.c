@@ -130,7 +130,7 @@ PetscErrorCode HycoResultantsFind(HycoROM m, HycoResultants *resultants)
 }
 
 /* The bodies from whose balance quantity q follows; NULL: it does not. */
-static const PetscBool *Bodies(HycoROM m, HycoResultants r, PetscInt q)
+static const PetscBool *ResultantsBodies(HycoROM m, HycoResultants r, PetscInt q)
 {
   const PetscBool *of = r->balanced + q * m->model->scene->n_bodies;
 
@@ -144,25 +144,26 @@ static const PetscBool *Bodies(HycoROM m, HycoResultants r, PetscInt q)
 /* Those on which contact acts from outside. */
 const PetscBool *HycoResultantsPushed(HycoROM m, HycoResultants r, PetscInt q)
 {
-  return r && m->model->scene->quantity[q].kind == HYCO_QUANTITY_REACTION && r->pushed[q] ? Bodies(m, r, q) : NULL;
+  return r && m->model->scene->quantity[q].kind == HYCO_QUANTITY_REACTION && r->pushed[q] ? ResultantsBodies(m, r, q)
+                                                                                          : NULL;
 }
 
 PetscBool HycoResultantsFollow(HycoROM m, HycoResultants r, PetscInt q)
 {
-  return (PetscBool)(r && m->model->scene->quantity[q].kind == HYCO_QUANTITY_REACTION && Bodies(m, r, q));
+  return (PetscBool)(r && m->model->scene->quantity[q].kind == HYCO_QUANTITY_REACTION && ResultantsBodies(m, r, q));
 }
 
 /* One quantity that does not follow makes the sums over supports necessary. */
 PetscBool HycoResultantsSuffice(HycoROM m, HycoResultants r)
 {
   for (PetscInt q = 0; q < m->model->scene->n_quantities; q++) {
-    if (m->model->scene->quantity[q].kind == HYCO_QUANTITY_REACTION && !Bodies(m, r, q)) return PETSC_FALSE;
+    if (m->model->scene->quantity[q].kind == HYCO_QUANTITY_REACTION && !ResultantsBodies(m, r, q)) return PETSC_FALSE;
   }
   return PETSC_TRUE;
 }
 
 /* The loads on the bodies of[b] along an axis. */
-static PetscReal Load(HycoResultants r, const PetscBool of[], PetscInt axis)
+static PetscReal ResultantsLoad(HycoResultants r, const PetscBool of[], PetscInt axis)
 {
   PetscReal sum = 0;
 
@@ -171,7 +172,7 @@ static PetscReal Load(HycoResultants r, const PetscBool of[], PetscInt axis)
 }
 
 /* Whether the loads at mu differ from those at another point. */
-static PetscBool Differ(HycoResultants r, const PetscReal other[], const PetscReal mu[])
+static PetscBool ResultantsDiffer(HycoResultants r, const PetscReal other[], const PetscReal mu[])
 {
   const HycoScene s = r->fe->scene;
   PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, heat = PETSC_FALSE, moved = PETSC_FALSE;
@@ -191,8 +192,8 @@ static PetscBool Differ(HycoResultants r, const PetscReal other[], const PetscRe
   return (PetscBool)(moved || heat || HycoSceneLoadsChange(s, changed));
 }
 
-/* The loads at mu, unless they are there or no change affects them. In place of those that were asked for longest ago: a
-   gradient asks for its point's and for those to both sides. */
+/* The loads at mu, unless they are there or no change affects them. In place of those that were asked for longest ago:
+   a gradient asks for its point's and for those to both sides. */
 static PetscErrorCode BringLoads(HycoResultants r, const PetscReal mu[])
 {
   Loads *oldest = r->at;
@@ -201,7 +202,7 @@ static PetscErrorCode BringLoads(HycoResultants r, const PetscReal mu[])
   for (PetscInt k = 0; k < KEPT; k++) {
     Loads *one = &r->at[k];
 
-    if (one->used && !Differ(r, one->mu, mu)) {
+    if (one->used && !ResultantsDiffer(r, one->mu, mu)) {
       one->used = ++r->uses;
       r->load = one->load;
       PetscFunctionReturn(PETSC_SUCCESS);
@@ -227,14 +228,14 @@ PetscErrorCode HycoResultantsSet(HycoROM m, HycoResultants r, const PetscReal mu
   PetscFunctionBegin;
   for (PetscInt q = 0; r && q < m->model->scene->n_quantities; q++) {
     const PetscInt axis = m->model->scene->quantity[q].field;
-    const PetscBool *of = Bodies(m, r, q);
+    const PetscBool *of = ResultantsBodies(m, r, q);
     PetscReal push = 0;
 
     if (!of) continue;
     PetscCall(BringLoads(r, mu));
     if (r->pushed[q]) PetscCall(HycoROMPushBodies(m, Lambda, of, axis, &push));
     /* 0 - x: no negative zero in reports. */
-    value[q] = 0 - push - Load(r, of, axis);
+    value[q] = 0 - push - ResultantsLoad(r, of, axis);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

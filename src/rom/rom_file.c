@@ -9,8 +9,8 @@
 /* The file's format version, raised when a reader of older versions must not read the file. 2: contacts have
    weighted masters. 3: problem/type; a file without it is hybrid. 4: further types. 5: masters are
    searched on surfaces that a map moves, and a slave node may face none; models without such surfaces are written as
-   4. 6: models of scenes with a history. 7: hybrid ones with friction. The kind is common to all types, so that an older reader can report the
-   format. */
+   4. 6: models of scenes with a history. 7: hybrid ones with friction. The kind is common to all types, so that an
+   older reader can report the format. */
 #define HYCO_ROM_FORMAT 7
 #define HYCO_ROM_PATHS  6
 #define HYCO_ROM_MOVED  5
@@ -147,8 +147,8 @@ static PetscErrorCode SaveOutputEstimates(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The held-out errors, the fitted laws of the estimates and the features reached in training. Infinite errors are written
-   as the largest number, because a model file holds finite numbers only. */
+/* The held-out errors, the fitted laws of the estimates and the features reached in training. Infinite errors are
+   written as the largest number, because a model file holds finite numbers only. */
 static PetscErrorCode SaveEstimates(HycoH5 h, HycoROM m)
 {
   const HycoEstimates *t = &m->model->estimates;
@@ -330,8 +330,8 @@ static PetscErrorCode LoadOutputEstimates(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The laws of the estimates, or those of older files under their former name. Every number is checked: a damaged file must
-   not give a plausible estimate. */
+/* The laws of the estimates, or those of older files under their former name. Every number is checked: a damaged file
+   must not give a plausible estimate. */
 static PetscErrorCode LoadEstimates(HycoH5 h, HycoROM m)
 {
   HycoEstimates *t = &m->model->estimates;
@@ -568,8 +568,8 @@ PetscErrorCode HycoROMSave(HycoROM m, HycoFOM mesh, PetscInt l, Mat V, const cha
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fields, solutions and snapshots are HDF5 files too: the message says which file to give. A format that is too new or too
-   old is refused before anything else is read. */
+/* Fields, solutions and snapshots are HDF5 files too: the message says which file to give. A format that is too new or
+   too old is refused before anything else is read. */
 static PetscErrorCode CheckKind(HycoH5 h, const char path[])
 {
   char *kind;
@@ -594,7 +594,7 @@ static PetscErrorCode CheckKind(HycoH5 h, const char path[])
 }
 
 /* Reads from an open file, and closes it; a refused file leaves no model. `path`: its name in messages. */
-static PetscErrorCode Load(HycoH5 *h, const char path[], HycoROM *model)
+static PetscErrorCode RomFileLoad(HycoH5 *h, const char path[], HycoROM *model)
 {
   HycoROM m;
   PetscErrorCode ierr;
@@ -628,7 +628,7 @@ PetscErrorCode HycoROMLoad(const char path[], HycoROM *model)
              "HycoROMLoad: the path or the handle's address is NULL");
   *model = NULL;
   PetscCall(HycoH5OpenOr(path, "if it was a model, train it again", &h));
-  PetscCall(Load(&h, path, model));
+  PetscCall(RomFileLoad(&h, path, model));
   PetscCall(HycoROMViewFromOptions(*model, NULL, "-hyco_rom_view"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -656,7 +656,7 @@ static PetscErrorCode FromImage(void *image, size_t size, HycoROM *model)
 
   PetscFunctionBegin;
   PetscCall(HycoH5OpenImage("the model", image, size, &h));
-  PetscCall(Load(&h, "", model));
+  PetscCall(RomFileLoad(&h, "", model));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -151,7 +151,7 @@ PetscErrorCode HycoTraceOptions(HycoROM m, HycoPath p)
 }
 
 /* Sets the results of the whole path. */
-static void Summarise(HycoPath p, HycoPrediction *out)
+static void RomPathSummarise(HycoPath p, HycoPrediction *out)
 {
   out->kkt = p->kkt;
   if (out->reason > 0) out->reason = p->ended ? HYCO_CONVERGED : HYCO_DIVERGED_STEP;
@@ -190,7 +190,7 @@ PetscErrorCode HycoTraceFollow(HycoROM m, HycoPath p, const PetscReal mu[])
   m->trace.n_cuts = p->n_cuts;
   HycoPathGetHistory(p, &m->trace.history);
   if (p->n_stops && !p->substeps && p->time_tol > 0) m->trace.history.time_error = m->model->time_error;
-  Summarise(p, out);
+  RomPathSummarise(p, out);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -10,7 +10,7 @@ const char *const HycoLinearNames[] = {"auto", "direct", "iterative", NULL};
 #define HYCO_PLANE_ROW 20
 
 /* Free memory of this machine in bytes. */
-static PetscReal Available(void)
+static PetscReal FormChoiceAvailable(void)
 {
   FILE *file = fopen("/proc/meminfo", "r");
   char line[128];
@@ -37,7 +37,7 @@ PetscErrorCode HycoSolverMemory(HycoSolver s, PetscReal *bytes)
   if (*bytes > 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCallMPI(MPI_Comm_split_type(HycoComm(s), MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node));
   /* One rank per machine reads it: the sum over all ranks would count a machine's memory as often as it has ranks. */
-  mine = HycoRank(node) == 0 ? 0.8 * Available() : 0;
+  mine = HycoRank(node) == 0 ? 0.8 * FormChoiceAvailable() : 0;
   PetscCallMPI(MPI_Allreduce(&mine, bytes, 1, MPIU_REAL, MPI_SUM, HycoComm(s)));
   PetscCallMPI(MPI_Comm_free(&node));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -45,7 +45,7 @@ PetscErrorCode HycoSolverMemory(HycoSolver s, PetscReal *bytes)
 
 /* Memory of the form's factor: its own estimate, or that of a factor of K. Analysis without numbers; a form may keep
    it for its factorisation. */
-static PetscErrorCode Estimate(HycoSolver s, HycoSolverForm form, PetscReal *bytes)
+static PetscErrorCode FormChoiceEstimate(HycoSolver s, HycoSolverForm form, PetscReal *bytes)
 {
   HycoDirect probe = NULL;
   PetscReal begin = HycoNow();
@@ -104,7 +104,7 @@ static PetscErrorCode DecideByMemory(HycoSolver s, HycoSolverForm *form)
   PetscCall(MatGetInfo(s->system->K, MAT_GLOBAL_SUM, &info));
   if (info.nz_used <= HYCO_PLANE_ROW * (PetscReal)s->system->n || !s->system->symmetric)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Estimate(s, *form, &bytes));
+  PetscCall(FormChoiceEstimate(s, *form, &bytes));
   PetscCall(HycoSolverMemory(s, &limit));
   if (bytes > limit) PetscCall(TakeIterative(s, form));
   if (s->iterative)

@@ -11,9 +11,9 @@
 #define LEFT     1e-6  /* of the square of a motion: below, nothing is left of it */
 #define ROUNDING 1e-12 /* of all loads: below, their work on the motions is round-off */
 
-/* Adds normal forces to the forces r that come nearest to the load f, so that the rest f - A r is a motion along which no
-   contact opens: the one by which the bodies slide. First of all contacts, then, if that leaves nothing, of those with a
-   force; else r stays. */
+/* Adds normal forces to the forces r that come nearest to the load f, so that the rest f - A r is a motion along which
+   no contact opens: the one by which the bodies slide. First of all contacts, then, if that leaves nothing, of those
+   with a force; else r stays. */
 PetscErrorCode HycoBlocksLeaveSlide(const HycoBlocks *blocks, PetscInt p, const PetscReal A[], const PetscReal f[],
                                     PetscReal r[])
 {
@@ -56,7 +56,8 @@ PetscErrorCode HycoBlocksLeaveSlide(const HycoBlocks *blocks, PetscInt p, const 
 
 /* The same with other cones, as of friction, on the orthonormal motions; without forces that balance the load, the
    rest of it with L tells how the bodies move. */
-static PetscErrorCode Slides(HycoSystem y, PetscInt p, const Vec z[], Vec L, PetscBool *slides)
+static PetscErrorCode SolverFloatingNoEquilibrium(HycoSystem y, PetscInt p, const Vec z[], Vec L,
+                                                  PetscBool *no_equilibrium)
 {
   HycoBlocks *blocks;
   PetscReal *A, *f, *row;
@@ -70,17 +71,17 @@ static PetscErrorCode Slides(HycoSystem y, PetscInt p, const Vec z[], Vec L, Pet
   PetscCall(HycoMotionRows(y->B, p, z, y->work_L, A));
   for (PetscInt i = 0; i < p; i++) PetscCall(VecDot(y->F, z[i], &f[i]));
   PetscCall(HycoBlocksBalance(blocks, p, A, f, 0, row, &exists));
-  *slides = (PetscBool)!exists;
-  if (*slides) PetscCall(HycoBlocksLeaveSlide(blocks, p, A, f, row));
+  *no_equilibrium = (PetscBool)!exists;
+  if (*no_equilibrium) PetscCall(HycoBlocksLeaveSlide(blocks, p, A, f, row));
   PetscCall(VecGetOwnershipRange(L, &lo, &hi));
-  if (*slides) PetscCall(HycoVecWrite(L, hi - lo, row + lo));
+  if (*no_equilibrium) PetscCall(HycoVecWrite(L, hi - lo, row + lo));
   PetscCall(PetscFree3(A, f, row));
   PetscCall(HycoBlocksDestroy(&blocks));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Without other cones: the nearest forces of least squares in L, whose rest is a motion that closes no contact. */
-static PetscErrorCode Lifts(HycoSystem y, PetscInt p, const Vec z[], Vec L, PetscBool *lifts)
+static PetscErrorCode SolverFloatingLiftOff(HycoSystem y, PetscInt p, const Vec z[], Vec L, PetscBool *lift_off)
 {
   PetscReal *A, *f, *row, all;
   PetscInt lo, hi;
@@ -93,25 +94,26 @@ static PetscErrorCode Lifts(HycoSystem y, PetscInt p, const Vec z[], Vec L, Pets
   for (PetscInt i = 0; i < p; i++) PetscCall(VecDot(y->F, z[i], &f[i]));
   PetscCall(VecNorm(y->F, NORM_1, &all));
   PetscCall(HycoNormalsBalance(p, y->m, A, f, ROUNDING * all, row, &exists));
-  *lifts = (PetscBool)!exists;
+  *lift_off = (PetscBool)!exists;
   PetscCall(VecGetOwnershipRange(L, &lo, &hi));
-  if (*lifts) PetscCall(HycoVecWrite(L, hi - lo, row + lo));
+  if (*lift_off) PetscCall(HycoVecWrite(L, hi - lo, row + lo));
   PetscCall(PetscFree3(A, f, row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the load lifts a floating body off, or moves it along: no contact forces balance it on the rigid modes. Otherwise
-   a failure of the solver is its own. Collective. */
-PetscErrorCode HycoSystemLifts(HycoSystem y, Vec L, PetscBool *lifts)
+/* Whether the load lifts a floating body off, or moves it along: no contact forces balance it on the rigid modes.
+   Otherwise a failure of the solver is its own. Collective. */
+PetscErrorCode HycoSystemLiftOff(HycoSystem y, Vec L, PetscBool *lift_off)
 {
   PetscInt p;
   const Vec *motion;
 
   PetscFunctionBegin;
-  *lifts = PETSC_FALSE;
+  *lift_off = PETSC_FALSE;
   if (!y->K) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoKernelVectors(y->K, &p, &motion));
   if (!p || !y->m) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(y->blocks ? Slides(y, p, motion, L, lifts) : Lifts(y, p, motion, L, lifts));
+  PetscCall(y->blocks ? SolverFloatingNoEquilibrium(y, p, motion, L, lift_off)
+                      : SolverFloatingLiftOff(y, p, motion, L, lift_off));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

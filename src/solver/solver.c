@@ -309,7 +309,7 @@ static PetscErrorCode SetMethod(HycoSolver s, const Candidate *c)
 }
 
 /* Asks the form; the reason of a form that could take the cones is kept. */
-static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscReal *cost, char why[HYCO_LINE])
+static PetscErrorCode SolverAccepts(HycoSolver s, HycoSolverForm form, PetscReal *cost, char why[HYCO_LINE])
 {
   PetscFunctionBegin;
   if (s->system->blocks && s->system->m && !form->cones) {
@@ -336,18 +336,18 @@ PetscErrorCode HycoSolverAcceptingForm(HycoSolver s, HycoSolverForm stay, HycoSo
   why[0] = '\0';
   if (!stay && s->form_name[0] && posed && !s->falling_back) {
     stay = HycoSolverFindForm(s, s->form_name);
-    PetscCall(Accepts(s, stay, &cost, why));
+    PetscCall(SolverAccepts(s, stay, &cost, why));
     if (cost >= 0) *form = stay;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (stay) PetscCall(Accepts(s, stay, &cost, why));
+  if (stay) PetscCall(SolverAccepts(s, stay, &cost, why));
   if (cost >= 0) {
     *form = stay;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   for (PetscInt k = 0; k < s->n_forms; k++) {
     /* The cheapest; a form that refuses may say why, for the case that none accepts. */
-    PetscCall(Accepts(s, s->forms[k], &cost, why));
+    PetscCall(SolverAccepts(s, s->forms[k], &cost, why));
     if (cost < 0 || cost >= least) continue;
     least = cost;
     *form = s->forms[k];
@@ -408,7 +408,7 @@ void HycoSolverExplain(HycoSolver s, char why[HYCO_LINE])
 }
 
 /* The reason follows from the recomputed residuals alone; `solved` only distinguishes the text of a failure. */
-static PetscErrorCode Judge(HycoSolver s, Vec x, Vec L, PetscBool solved)
+static PetscErrorCode SolverJudge(HycoSolver s, Vec x, Vec L, PetscBool solved)
 {
   PetscFunctionBegin;
   HycoLogged(HYCO_EVENT_KKT, HycoSystemComputeKKT(s->system, x, L, &s->kkt));
@@ -423,7 +423,7 @@ static PetscErrorCode Judge(HycoSolver s, Vec x, Vec L, PetscBool solved)
 
 /* Solves with the current method on that form, and checks the result; adds its iterations. The form may change
    s->reason to singular. */
-static PetscErrorCode Attempt(HycoSolver s, HycoSolverForm form, Vec x, Vec L)
+static PetscErrorCode SolverAttempt(HycoSolver s, HycoSolverForm form, Vec x, Vec L)
 {
   const PetscInt its = s->its;
   PetscBool solved = PETSC_FALSE;
@@ -431,14 +431,14 @@ static PetscErrorCode Attempt(HycoSolver s, HycoSolverForm form, Vec x, Vec L)
   PetscFunctionBegin;
   s->form = form;
   s->its = 0;
-  /* For forms that say nothing: Judge() decides by the residuals. */
+  /* For forms that say nothing: SolverJudge() decides by the residuals. */
   s->reason = HYCO_DIVERGED_RESIDUAL;
   s->by_factor = PETSC_TRUE;
   s->failure[0] = '\0';
   PetscCall(form->ops->solve(s, form, x, L, &solved));
   if (!s->failure[0] && !solved && s->now.traits && !(s->now.traits & HYCO_TAO_OWN))
     PetscCall(PetscStrncpy(s->failure, HycoTaoFailure(), sizeof(s->failure)));
-  PetscCall(Judge(s, x, L, solved));
+  PetscCall(SolverJudge(s, x, L, solved));
   s->its += its;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -459,10 +459,10 @@ static PetscErrorCode DecideByForces(HycoSolver s, Vec x, Vec L)
     PetscFunctionReturn(PETSC_SUCCESS);
   s->falling_back = PETSC_TRUE;
   PetscCall(SetMethod(s, by_default));
-  PetscCall(Accepts(s, dual, &cost, why));
+  PetscCall(SolverAccepts(s, dual, &cost, why));
   if (cost < 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscStrncpy(before, s->method, sizeof(before)));
-  PetscCall(Attempt(s, dual, x, L));
+  PetscCall(SolverAttempt(s, dual, x, L));
   PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s, then dual", before));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -494,7 +494,7 @@ static PetscErrorCode FormOf(HycoSolver s, const Candidate *c, HycoSolverForm *f
 
 /* Solves with one method; again if its form can solve with less round-off. *tried: a form accepts it. A refinement
    counts as part of the same method. */
-static PetscErrorCode Try(HycoSolver s, const Candidate *c, Vec x, Vec L, PetscBool *tried)
+static PetscErrorCode SolverTry(HycoSolver s, const Candidate *c, Vec x, Vec L, PetscBool *tried)
 {
   char before[sizeof(s->method)];
   PetscBool better = PETSC_FALSE;
@@ -506,10 +506,10 @@ static PetscErrorCode Try(HycoSolver s, const Candidate *c, Vec x, Vec L, PetscB
   *tried = (PetscBool)(form != NULL);
   if (!form) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscStrncpy(before, s->method, sizeof(before)));
-  PetscCall(Attempt(s, form, x, L));
+  PetscCall(SolverAttempt(s, form, x, L));
   /* A residual just above the tolerance may be round-off of the factor, which twice the precision removes. */
   if (s->reason < 0 && s->refine && form->ops->refine) PetscCall(form->ops->refine(s, form, &better));
-  if (s->reason < 0 && better) PetscCall(Attempt(s, form, x, L));
+  if (s->reason < 0 && better) PetscCall(SolverAttempt(s, form, x, L));
   if (s->falling_back) PetscCall(NameFallback(s, before));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -529,7 +529,7 @@ static PetscBool IsNext(HycoSolver s, int k, const PetscBool tried[], const char
 
 /* Tries methods in order, from the chosen one on, until one converges. A singular K ends the attempts: other methods
    would meet the same factor. */
-static PetscErrorCode Attempts(HycoSolver s, Vec x, Vec L)
+static PetscErrorCode SolverAttempts(HycoSolver s, Vec x, Vec L)
 {
   char chosen[HYCO_TAO_NAME] = "";
   PetscBool tried[N_CANDIDATES] = {PETSC_FALSE};
@@ -537,7 +537,7 @@ static PetscErrorCode Attempts(HycoSolver s, Vec x, Vec L)
   PetscFunctionBegin;
   for (int k = 0; k < N_CANDIDATES; k++) {
     if (!IsNext(s, k, tried, chosen)) continue;
-    PetscCall(Try(s, &order[k], x, L, &tried[k]));
+    PetscCall(SolverTry(s, &order[k], x, L, &tried[k]));
     /* The type for which an empty entry stood: it must not be tried twice. */
     if (!chosen[0]) PetscCall(PetscStrncpy(chosen, s->now.type, sizeof(chosen)));
     if (!tried[k]) continue;
@@ -555,7 +555,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
 {
   PetscInt n_free = 0;
   PetscReal begin = HycoNow();
-  PetscBool lifts = PETSC_FALSE;
+  PetscBool lift_off = PETSC_FALSE;
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
@@ -567,14 +567,14 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   s->seconds_factor = s->seconds_before;
   s->its = s->linear_its = s->linear_solves = s->linear_most = 0;
   s->falling_back = PETSC_FALSE;
-  PetscCall(Attempts(s, x, L));
+  PetscCall(SolverAttempts(s, x, L));
   for (PetscInt k = 0; k < s->n_forms; k++) {
     if (s->forms[k]->ops->reset) PetscCall(s->forms[k]->ops->reset(s, s->forms[k]));
   }
   /* A failure with floating bodies is either a load that lifts them off or one of the solver. */
   if (s->reason < 0 && s->system->K) PetscCall(HycoKernelSize(s->system->K, &n_free));
-  if (n_free) PetscCall(HycoSystemLifts(s->system, L, &lifts));
-  if (n_free) s->reason = lifts ? HYCO_DIVERGED_FLOATING : HYCO_DIVERGED_HELD;
+  if (n_free) PetscCall(HycoSystemLiftOff(s->system, L, &lift_off));
+  if (n_free) s->reason = lift_off ? HYCO_DIVERGED_FLOATING : HYCO_DIVERGED_HELD;
   /* What was passed for one solve ends here, whether or not it was used. */
   s->free = NULL;
   s->start_set = NULL;

@@ -41,8 +41,8 @@ static PetscErrorCode FactorDense(HycoStiffness *f, Mat K, PetscBool *singular)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* E of the soft motions v: the springs' stiffness less the work of their forces K v on the deformation under them, which
-   the pins allow. The Schur complement has it only to round-off of K. */
+/* E of the soft motions v: the springs' stiffness less the work of their forces K v on the deformation under them,
+   which the pins allow. The Schur complement has it only to round-off of K. */
 static PetscErrorCode SpringBlock(const HycoSoft *soft, Mat K, HycoDirect direct, PetscReal E[])
 {
   const PetscInt p = soft->n;

@@ -276,7 +276,7 @@ PetscReal HycoKKTMax(const HycoKKT *kkt)
 }
 
 /* 0 / 0 is 0: without forces and gaps there is no violation; x / 0 and NaN are infinite. */
-static PetscReal Quotient(PetscReal a, PetscReal b)
+static PetscReal SystemQuotient(PetscReal a, PetscReal b)
 {
   if (PetscIsInfOrNanReal(a) || PetscIsInfOrNanReal(b)) return PETSC_MAX_REAL;
   return a == 0 ? 0 : b > 0 ? a / b : PETSC_MAX_REAL;
@@ -317,8 +317,8 @@ static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, Vec diagonal, Pet
 
 #define FAR 1e-9 /* a residual relative to the forces that a floating body's x may leave: it moves without any */
 
-/* The same by all terms of a row, which are more than the diagonal's: at most 4 eps sum |K_ij x_j|. Adds to *dropped. For K
-   with a null space, whose x has no bound; each rank needs all of x. Collective. */
+/* The same by all terms of a row, which are more than the diagonal's: at most 4 eps sum |K_ij x_j|. Adds to *dropped.
+   For K with a null space, whose x has no bound; each rank needs all of x. Collective. */
 static PetscErrorCode DropTerms(HycoSystem s, Vec x, Vec r, PetscReal *dropped)
 {
   PetscReal *all, square = 0;
@@ -354,7 +354,7 @@ static PetscErrorCode DropTerms(HycoSystem s, Vec x, Vec r, PetscReal *dropped)
 /* |K x + Bt L - F|, and the part of F - Bt L that no x balances if K is singular: it is computed from the forces
    only, because K x has the round-off of x, which is unlimited there. Relative to the forces: where |K x| is above
    their sum, it is round-off too. Relative to the larger of |B^T L| and |F|; collective. */
-static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value, PetscReal *rounding)
+static PetscErrorCode SystemStationarity(HycoSystem s, Vec x, Vec L, PetscReal *value, PetscReal *rounding)
 {
   Vec Kx = s->work_x[0], BtL = s->work_x[1];
   MatNullSpace kernel = NULL;
@@ -383,8 +383,8 @@ static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value,
   if (size == 0) size = terms;
   /* Absolute: paths compare it with Newton's residual. */
   s->residual = nr;
-  *value = PetscMax(Quotient(nr, size), free_work);
-  *rounding = Quotient(dropped, size);
+  *value = PetscMax(SystemQuotient(nr, size), free_work);
+  *rounding = SystemQuotient(dropped, size);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -403,9 +403,9 @@ static PetscErrorCode BlockKKT(HycoSystem s, const PetscReal w[], const PetscRea
   local[0] = map.missing, local[1] = map.outside, local[2] = map.map;
   /* Blocks are on the ranks of their rows. */
   PetscCallMPI(MPI_Allreduce(local, worst, 3, MPIU_REAL, MPI_MAX, HycoComm(s)));
-  kkt->penetration = Quotient(worst[0], force);
-  kkt->adhesion = Quotient(worst[1], force);
-  kkt->complementarity = Quotient(worst[2], force);
+  kkt->penetration = SystemQuotient(worst[0], force);
+  kkt->adhesion = SystemQuotient(worst[1], force);
+  kkt->complementarity = SystemQuotient(worst[2], force);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -449,7 +449,7 @@ static PetscErrorCode FlexibilityKKT(HycoSystem s, Vec L, HycoKKT *kkt)
   kkt->complementarity = worst[2];
   for (PetscInt i = 0; s->blocks && i < m; i++) stiffest = PetscMax(stiffest, G[(size_t)i * (size_t)m + (size_t)i]);
   /* Without any force the gap over the stiffest flexibility is the scale of forces. */
-  if (s->blocks) PetscCall(BlockKKT(s, w, l, size, most, Quotient(size, stiffest), kkt));
+  if (s->blocks) PetscCall(BlockKKT(s, w, l, size, most, SystemQuotient(size, stiffest), kkt));
   PetscCall(VecRestoreArray(s->work_L, &w));
   PetscCall(VecRestoreArrayRead(L, &l));
   PetscCall(VecRestoreArrayRead(s->D, &g));
@@ -495,7 +495,7 @@ PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
   }
   PetscCheck(s->F, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoSystemSetVectors() before HycoSystemComputeKKT()");
   PetscCall(HycoSystemWork(s));
-  PetscCall(Stationarity(s, x, L, &kkt->stationarity, &kkt->rounding));
+  PetscCall(SystemStationarity(s, x, L, &kkt->stationarity, &kkt->rounding));
   if (PetscIsInfOrNanReal(kkt->stationarity)) kkt->stationarity = PETSC_MAX_REAL;
   if (!s->m) PetscFunctionReturn(PETSC_SUCCESS);
   gap = s->work_L;
@@ -524,9 +524,9 @@ PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
   PetscCall(VecRestoreArrayRead(gap, &w));
   PetscCall(VecRestoreArrayRead(L, &l));
   PetscCallMPI(MPI_Allreduce(local, worst, 3, MPIU_REAL, MPI_MAX, HycoComm(s)));
-  kkt->penetration = Quotient(worst[0], size_gap);
-  kkt->adhesion = Quotient(worst[1], size_L);
-  kkt->complementarity = Quotient(worst[2], size_gap * size_L);
+  kkt->penetration = SystemQuotient(worst[0], size_gap);
+  kkt->adhesion = SystemQuotient(worst[1], size_L);
+  kkt->complementarity = SystemQuotient(worst[2], size_gap * size_L);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

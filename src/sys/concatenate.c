@@ -2,8 +2,8 @@
 #include <hycoimpl.h>
 
 /* Ordered by rank. *all is allocated with room for one more, so that it is never NULL where the rows are. */
-static PetscErrorCode Concatenate(MPI_Comm comm, PetscBool everywhere, PetscInt n, const void *mine, MPI_Datatype type,
-                                  size_t size, PetscInt *n_all, void *all)
+static PetscErrorCode ConcatenateParts(MPI_Comm comm, PetscBool everywhere, PetscInt n, const void *mine,
+                                       MPI_Datatype type, size_t size, PetscInt *n_all, void *all)
 {
   PetscMPIInt ranks, count, *counts, *offsets;
 
@@ -31,14 +31,14 @@ static PetscErrorCode Concatenate(MPI_Comm comm, PetscBool everywhere, PetscInt 
 PetscErrorCode HycoConcatenate(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, size_t size,
                                PetscInt *n_all, void *all)
 {
-  return Concatenate(comm, PETSC_FALSE, n, mine, type, size, n_all, all);
+  return ConcatenateParts(comm, PETSC_FALSE, n, mine, type, size, n_all, all);
 }
 
 /* The same on every rank. */
 PetscErrorCode HycoConcatenateAll(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, size_t size,
                                   PetscInt *n_all, void *all)
 {
-  return Concatenate(comm, PETSC_TRUE, n, mine, type, size, n_all, all);
+  return ConcatenateParts(comm, PETSC_TRUE, n, mine, type, size, n_all, all);
 }
 
 /* Every rank gets all entries, for vectors of the contacts' size alone. Counts and offsets are ints of MPI, which

@@ -34,7 +34,7 @@ static PetscErrorCode CatchHandler(MPI_Comm comm, int line, const char *function
 
 /* The number of bytes of the character at `c` if it can be printed, in UTF-8 without control characters; 0: it cannot.
    No full check of UTF-8: enough that nothing moves the cursor. */
-static size_t Printable(const unsigned char *c)
+static size_t ErrorPrintable(const unsigned char *c)
 {
   const size_t n = c[0] < 0x80 ? 1 : c[0] >= 0xc2 && c[0] < 0xe0 ? 2 : (c[0] & 0xf0) == 0xe0 ? 3 : c[0] < 0xf5 ? 4 : 0;
 
@@ -49,7 +49,7 @@ static size_t Printable(const unsigned char *c)
 void HycoMakePrintable(char text[])
 {
   for (char *c = text; *c;) {
-    const size_t n = Printable((const unsigned char *)c);
+    const size_t n = ErrorPrintable((const unsigned char *)c);
 
     if (!n) *c = strchr(" \t\r\n", *c) ? ' ' : '?';
     c += n ? n : 1;

@@ -22,7 +22,7 @@ struct _n_HycoFile {
 
 /* Identifies the machine since its last start, and the space of its process ids: each container has its own. A process
    id alone would match another machine's process on a shared disk. */
-static unsigned Node(void)
+static unsigned FileNode(void)
 {
   static unsigned node;
   char text[512] = "";
@@ -69,11 +69,11 @@ void HycoFileOwner(const char name[], char owner[HYCO_FILE_NAME])
 }
 
 /* In the folder of the final file: rename() is atomic only within a file system. */
-static void Temporary(const char place[], const char kind[], char name[HYCO_FILE_NAME])
+static void FileTemporary(const char place[], const char kind[], char name[HYCO_FILE_NAME])
 {
   static unsigned number;
 
-  snprintf(name, HYCO_FILE_NAME, "%s.hyco-%08x-%ld-%u.%s", place, Node(), (long)getpid(), number++, kind);
+  snprintf(name, HYCO_FILE_NAME, "%s.hyco-%08x-%ld-%u.%s", place, FileNode(), (long)getpid(), number++, kind);
 }
 
 /* Whether the file of that name was left by a process that no longer exists. kill() with signal 0 only asks
@@ -82,7 +82,7 @@ static PetscBool IsLeft(const char path[], unsigned node, long pid)
 {
   struct stat info;
 
-  if (node == Node()) return (PetscBool)(pid > 0 && kill((pid_t)pid, 0) != 0 && errno == ESRCH);
+  if (node == FileNode()) return (PetscBool)(pid > 0 && kill((pid_t)pid, 0) != 0 && errno == ESRCH);
   return (PetscBool)(stat(path, &info) == 0 && S_ISREG(info.st_mode) && time(NULL) - info.st_mtime > OLD);
 }
 
@@ -127,7 +127,7 @@ PetscErrorCode HycoFileScratch(MPI_Comm comm, const char path[], const char kind
   PetscFunctionBegin;
   if (HycoRank(comm) == 0) {
     HycoFileFollow(path, place);
-    Temporary(place, kind, scratch);
+    FileTemporary(place, kind, scratch);
   }
   PetscCallMPI(MPI_Bcast(scratch, HYCO_FILE_NAME, MPI_CHAR, 0, comm));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -199,7 +199,7 @@ static PetscErrorCode OpenPlace(HycoFile f)
 
   PetscFunctionBegin;
   PetscCall(HycoFileCheckPlace("", f->path, f->kind, &f->direct));
-  if (!f->direct) Temporary(f->place, "partial", f->temporary);
+  if (!f->direct) FileTemporary(f->place, "partial", f->temporary);
   fd = f->direct ? open(f->path, O_WRONLY | O_APPEND) : open(f->temporary, O_WRONLY | O_CREAT | O_EXCL, 0666);
   f->stream = fd >= 0 ? fdopen(fd, "w") : NULL;
   PetscCall(CheckOpen(f->path, (PetscBool)(f->stream != NULL)));
@@ -231,7 +231,7 @@ FILE *HycoFileStream(HycoFile file)
 
 /* Flushes everything written to the file. Returns 0, or errno. Only numbers are forced to the disk: text is
    written again in seconds. */
-static int Flush(HycoFile f)
+static int FileFlush(HycoFile f)
 {
   errno = 0;
   if (fflush(f->stream) != 0 || ferror(f->stream) || (f->kind == HYCO_FILE_NUMBERS && fsync(fileno(f->stream)) != 0))
@@ -268,7 +268,7 @@ PetscErrorCode HycoFileFlush(HycoFile file)
 {
   PetscFunctionBegin;
   HycoCheckGiven(file);
-  PetscCall(HycoFileComplain(file->shown, Flush(file)));
+  PetscCall(HycoFileComplain(file->shown, FileFlush(file)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -283,7 +283,7 @@ PetscErrorCode HycoFileClose(HycoFile *file, PetscBool commit)
   PetscFunctionBegin;
   if (!f) PetscFunctionReturn(PETSC_SUCCESS);
   *file = NULL;
-  failed = commit ? Flush(f) : 0;
+  failed = commit ? FileFlush(f) : 0;
   if (fclose(f->stream) != 0 && commit && !failed) failed = errno ? errno : EIO;
   if (!f->direct) {
     if (commit && !failed && rename(f->temporary, f->place) != 0) failed = errno;

@@ -45,7 +45,7 @@ static herr_t RefuseLink(const char *parent_file, const char *parent_group, cons
 
 /* HDF5's own error printing is off, since errors are reported in one line. External links are refused when they are
    followed: a file could otherwise read any other. */
-static PetscErrorCode New(const char path[], HycoH5 *file)
+static PetscErrorCode H5New(const char path[], HycoH5 *file)
 {
   HycoH5 f;
 
@@ -61,7 +61,7 @@ static PetscErrorCode New(const char path[], HycoH5 *file)
 }
 
 /* Closing the file is the caller's. */
-static PetscErrorCode Free(HycoH5 *file)
+static PetscErrorCode H5Free(HycoH5 *file)
 {
   PetscFunctionBegin;
   H5Pclose((*file)->access);
@@ -70,7 +70,7 @@ static PetscErrorCode Free(HycoH5 *file)
 }
 
 /* Also of files that are only created: readers take what they find. */
-static hid_t Access(void)
+static hid_t H5Access(void)
 {
   hid_t access = H5Pcreate(H5P_FILE_ACCESS);
 
@@ -84,7 +84,7 @@ static hid_t Access(void)
 /* A property list for files in memory, which are not written to the disk automatically. */
 static hid_t InMemory(void)
 {
-  hid_t access = Access();
+  hid_t access = H5Access();
 
   H5Pset_fapl_core(access, (size_t)1 << 18, 0);
   return access;
@@ -109,7 +109,7 @@ static PetscErrorCode CreateImage(const char name[], PetscBool table, HycoH5 *fi
   HycoH5 f;
 
   PetscFunctionBegin;
-  PetscCall(New(name, &f));
+  PetscCall(H5New(name, &f));
   f->table = table;
   access = InMemory();
   f->id = H5Fcreate(f->path, H5F_ACC_TRUNC, H5P_DEFAULT, access);
@@ -129,7 +129,7 @@ PetscErrorCode HycoH5CreateImage(const char name[], HycoH5 *file)
 
 /* The output is opened first: a place that cannot be written to is an error before the numbers are computed. The file
    on the disk is written when it is closed. */
-static PetscErrorCode Create(const char path[], PetscBool table, HycoH5 *file)
+static PetscErrorCode H5Create(const char path[], PetscBool table, HycoH5 *file)
 {
   HycoFile out;
 
@@ -143,7 +143,7 @@ static PetscErrorCode Create(const char path[], PetscBool table, HycoH5 *file)
 PetscErrorCode HycoH5Create(const char path[], HycoH5 *file)
 {
   PetscFunctionBegin;
-  PetscCall(Create(path, PETSC_FALSE, file));
+  PetscCall(H5Create(path, PETSC_FALSE, file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -173,7 +173,7 @@ static PetscErrorCode BeginShared(HycoH5 f)
   PetscCall(HycoFileCheckPlace("", f->path, HYCO_FILE_NUMBERS, &direct));
   PetscCall(HycoFileOpenScratch(f->scratch, f->path, &f->fd));
   PetscCall(MakeRoom(f, 0));
-  access = Access();
+  access = H5Access();
   f->id = H5Fcreate(f->scratch, H5F_ACC_TRUNC, H5P_DEFAULT, access);
   H5Pclose(access);
   PetscCheck(f->id >= 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "HDF5 cannot create the file %s", f->scratch);
@@ -209,10 +209,10 @@ static PetscErrorCode CreateShared(MPI_Comm comm, const char path[], PetscBool t
 
   PetscFunctionBegin;
   if (HycoSize(comm) == 1) {
-    PetscCall(Create(path, table, file));
+    PetscCall(H5Create(path, table, file));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(New(path, &f));
+  PetscCall(H5New(path, &f));
   f->shared = PETSC_TRUE;
   f->table = table;
   f->comm = comm;
@@ -248,7 +248,7 @@ PetscErrorCode HycoH5OpenImage(const char name[], void *image, size_t size, Hyco
   HycoH5 f;
 
   PetscFunctionBegin;
-  PetscCall(New(name, &f));
+  PetscCall(H5New(name, &f));
   f->size = size;
   f->reads = PETSC_TRUE;
   H5Pset_file_image(access, image, size);
@@ -269,8 +269,8 @@ PetscErrorCode HycoH5Open(const char path[], HycoH5 *file)
   PetscBool sealed;
 
   PetscFunctionBegin;
-  PetscCall(HycoSealCheck(path, &size, &sealed));
-  PetscCall(New(path, &f));
+  PetscCall(HycoChecksumCheck(path, &size, &sealed));
+  PetscCall(H5New(path, &f));
   f->size = size;
   f->reads = PETSC_TRUE;
   access = H5Pcreate(H5P_FILE_ACCESS);
@@ -278,7 +278,7 @@ PetscErrorCode HycoH5Open(const char path[], HycoH5 *file)
   f->id = H5Fopen(path, H5F_ACC_RDONLY, access);
   H5Pclose(access);
   if (f->id < 0) {
-    PetscCall(Free(&f));
+    PetscCall(H5Free(&f));
     HycoFail("%s is not an HDF5 file, or it is damaged", path);
   }
   if (!sealed && (HycoH5Has(f, HYCO_H5_SEALED) || H5Aexists_by_name(f->id, "/", HYCO_H5_SEALED, H5P_DEFAULT) > 0)) {
@@ -342,21 +342,21 @@ PetscErrorCode HycoH5GetImage(HycoH5 f, void **image, size_t *size)
    reported when the file is closed. The checksum is of exactly what is written. */
 static PetscErrorCode WriteImage(HycoH5 f)
 {
-  unsigned char seal[HYCO_SEAL];
+  unsigned char seal[HYCO_CHECKSUM];
   void *image;
   size_t bytes;
 
   PetscFunctionBegin;
   PetscCall(HycoH5GetImage(f, &image, &bytes));
-  HycoSealMake(image, bytes, seal);
+  HycoChecksumMake(image, bytes, seal);
   (void)!fwrite(image, 1, bytes, HycoFileStream(f->out));
-  (void)!fwrite(seal, 1, HYCO_SEAL, HycoFileStream(f->out));
+  (void)!fwrite(seal, 1, HYCO_CHECKSUM, HycoFileStream(f->out));
   PetscCall(PetscFree(image));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Waits until every rank's numbers are on the disk. */
-static PetscErrorCode Sync(HycoH5 f)
+static PetscErrorCode H5Sync(HycoH5 f)
 {
   int failed = 0;
 
@@ -369,17 +369,17 @@ static PetscErrorCode Sync(HycoH5 f)
 }
 
 /* Seals the file and renames it. On rank 0. Sealed last: a file with a seal is complete. */
-static PetscErrorCode Place(HycoH5 f)
+static PetscErrorCode H5Position(HycoH5 f)
 {
-  unsigned char seal[HYCO_SEAL];
+  unsigned char seal[HYCO_CHECKSUM];
   size_t bytes;
   FILE *end;
   int failed = 0;
 
   PetscFunctionBegin;
-  PetscCall(HycoSealFile(f->scratch, &bytes, seal));
+  PetscCall(HycoChecksumFile(f->scratch, &bytes, seal));
   end = fopen(f->scratch, "ab");
-  if (!end || fwrite(seal, 1, HYCO_SEAL, end) != HYCO_SEAL || fflush(end) != 0 || fsync(fileno(end)) != 0)
+  if (!end || fwrite(seal, 1, HYCO_CHECKSUM, end) != HYCO_CHECKSUM || fflush(end) != 0 || fsync(fileno(end)) != 0)
     failed = errno ? errno : EIO;
   if (end && fclose(end) != 0 && !failed) failed = errno;
   PetscCall(HycoFileComplain(f->path, failed));
@@ -401,25 +401,25 @@ static PetscErrorCode EndLayout(HycoH5 f)
 }
 
 /* The order matters: layout, then all numbers, then the checksum over both. */
-static PetscErrorCode Commit(HycoH5 f)
+static PetscErrorCode H5Commit(HycoH5 f)
 {
   PetscFunctionBegin;
   HycoOnRoot(f->comm, EndLayout(f));
-  HycoOnEach(f->comm, Sync(f));
-  HycoOnRoot(f->comm, Place(f));
+  HycoOnEach(f->comm, H5Sync(f));
+  HycoOnRoot(f->comm, H5Position(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Renames the file once it is complete and sealed; otherwise nothing stays. */
 static PetscErrorCode CloseShared(HycoH5 f, PetscBool commit)
 {
-  PetscErrorCode ierr = commit ? Commit(f) : PETSC_SUCCESS;
+  PetscErrorCode ierr = commit ? H5Commit(f) : PETSC_SUCCESS;
 
   PetscFunctionBegin;
   if (f->id >= 0) H5Fclose(f->id);
   if (f->fd >= 0) close(f->fd);
   if (ierr || !commit) (void)unlink(f->scratch);
-  PetscCall(Free(&f));
+  PetscCall(H5Free(&f));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -441,7 +441,7 @@ PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit)
   out = f->out;
   ierr = out && commit ? WriteImage(f) : PETSC_SUCCESS;
   H5Fclose(f->id);
-  PetscCall(Free(&f));
+  PetscCall(H5Free(&f));
   if (ierr) PetscCall(HycoFileClose(&out, PETSC_FALSE));
   PetscCall(ierr);
   PetscCall(HycoFileClose(&out, commit));
@@ -454,7 +454,7 @@ PetscReal HycoH5Written(HycoH5 f)
 }
 
 /* The number of bytes of a row. HYCO_H5_LINE is a dataset of one dimension. */
-static size_t Width(hid_t type, PetscInt cols)
+static size_t H5Width(hid_t type, PetscInt cols)
 {
   return (cols == HYCO_H5_LINE ? 1 : (size_t)cols) * H5Tget_size(type);
 }
@@ -467,7 +467,7 @@ static PetscErrorCode CreateSet(HycoH5 f, const char name[], hid_t type, PetscIn
   hid_t space, links, made;
 
   PetscFunctionBegin;
-  if (f->shared) PetscCall(MakeRoom(f, (size_t)rows * Width(type, cols)));
+  if (f->shared) PetscCall(MakeRoom(f, (size_t)rows * H5Width(type, cols)));
   space = H5Screate_simple(cols == HYCO_H5_LINE ? 1 : 2, dims, NULL);
   links = H5Pcreate(H5P_LINK_CREATE);
   H5Pset_create_intermediate_group(links, 1);
@@ -515,10 +515,10 @@ static herr_t PutRows(hid_t set, hid_t type, PetscInt cols, PetscInt first, Pets
 
 /* Writes the rows first .. first + n - 1 of a dataset with `rows` rows; creates the dataset if it does not exist. A
    shared file's dataset has a place, at which numbers are written without HDF5. */
-static PetscErrorCode Write(HycoH5 f, const char name[], hid_t type, PetscInt rows, PetscInt cols, PetscInt first,
-                            PetscInt n, const void *data)
+static PetscErrorCode H5Write(HycoH5 f, const char name[], hid_t type, PetscInt rows, PetscInt cols, PetscInt first,
+                              PetscInt n, const void *data)
 {
-  const size_t width = Width(type, cols);
+  const size_t width = H5Width(type, cols);
   long long place = 0;
   herr_t failed = 0;
   hid_t set;
@@ -556,13 +556,13 @@ static PetscErrorCode LayOut(HycoH5 f, const char name[], MPI_Datatype type, Pet
 PetscErrorCode HycoH5WriteRows(HycoH5 f, const char name[], MPI_Datatype type, PetscInt rows, PetscInt cols,
                                PetscInt first, PetscInt n, const void *data)
 {
-  const size_t width = Width(NumberType(type), cols);
+  const size_t width = H5Width(NumberType(type), cols);
   long long place = 0;
 
   PetscFunctionBegin;
   HycoCheckGiven(f);
   if (!f->shared) {
-    PetscCall(Write(f, name, NumberType(type), rows, cols, first, n, data));
+    PetscCall(H5Write(f, name, NumberType(type), rows, cols, first, n, data));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   HycoOnRoot(f->comm, LayOut(f, name, type, rows, cols, &place));
@@ -576,7 +576,7 @@ PetscErrorCode HycoH5WriteReal(HycoH5 file, const char name[], PetscInt rows, Pe
 {
   PetscFunctionBegin;
   HycoCheckGiven(file);
-  PetscCall(Write(file, name, NumberType(MPIU_REAL), rows, cols, 0, rows, data));
+  PetscCall(H5Write(file, name, NumberType(MPIU_REAL), rows, cols, 0, rows, data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -585,7 +585,7 @@ PetscErrorCode HycoH5WriteSingle(HycoH5 file, const char name[], PetscInt rows, 
 {
   PetscFunctionBegin;
   HycoCheckGiven(file);
-  PetscCall(Write(file, name, H5T_NATIVE_FLOAT, rows, cols, 0, rows, data));
+  PetscCall(H5Write(file, name, H5T_NATIVE_FLOAT, rows, cols, 0, rows, data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -593,7 +593,7 @@ PetscErrorCode HycoH5WriteInt(HycoH5 file, const char name[], PetscInt rows, Pet
 {
   PetscFunctionBegin;
   HycoCheckGiven(file);
-  PetscCall(Write(file, name, NumberType(MPIU_INT), rows, cols, 0, rows, data));
+  PetscCall(H5Write(file, name, NumberType(MPIU_INT), rows, cols, 0, rows, data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -602,7 +602,7 @@ PetscErrorCode HycoH5WriteText(HycoH5 file, const char name[], const char text[]
 {
   PetscFunctionBegin;
   HycoCheckGiven(file);
-  PetscCall(Write(file, name, H5T_NATIVE_CHAR, (PetscInt)strlen(text), 1, 0, (PetscInt)strlen(text), text));
+  PetscCall(H5Write(file, name, H5T_NATIVE_CHAR, (PetscInt)strlen(text), 1, 0, (PetscInt)strlen(text), text));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

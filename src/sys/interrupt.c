@@ -10,7 +10,7 @@ static int depth;          /* pairs of Begin and End */
 static int (*asked)(void); /* of the outermost pair */
 static struct sigaction before;
 
-static void Note(int number)
+static void InterruptAdd(int number)
 {
   (void)number;
   came = 1;
@@ -19,7 +19,7 @@ static void Note(int number)
 /* SA_RESTART: reads, writes and waits of MPI and HDF5 go on. */
 void HycoInterruptBegin(int (*ask)(void))
 {
-  struct sigaction mine = {.sa_handler = Note, .sa_flags = SA_RESTART};
+  struct sigaction mine = {.sa_handler = InterruptAdd, .sa_flags = SA_RESTART};
 
   if (depth++) return;
   came = 0;

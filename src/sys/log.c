@@ -44,14 +44,15 @@ const char *HycoLogDoing(void)
 }
 
 /* Deeper events are counted but not noted, so that begin and end stay paired. */
-static void Note(HycoEvent event, PetscBool begin)
+static void LogRegistered(HycoEvent event, PetscBool begin)
 {
   if (begin && depth < DEEPEST) running[depth] = (int)event;
   depth += begin ? 1 : -1;
 }
 
-/* If a name cannot be registered, its time counts for the enclosing event. At the first event, when PETSc has been initialised. */
-static PetscErrorCode Register(void)
+/* If a name cannot be registered, its time counts for the enclosing event. At the first event, when PETSc has been
+   initialised. */
+static PetscErrorCode LogRegister(void)
 {
   PetscClassId id;
 
@@ -67,8 +68,8 @@ static PetscErrorCode Register(void)
 PetscErrorCode HycoLogEvent(HycoEvent event, PetscBool begin)
 {
   PetscFunctionBegin;
-  if (!registered) PetscCall(Register());
-  Note(event, begin);
+  if (!registered) PetscCall(LogRegister());
+  LogRegistered(event, begin);
   if (begin)
     PetscCall(PetscLogEventBegin(events[event], 0, 0, 0, 0));
   else
@@ -79,7 +80,7 @@ PetscErrorCode HycoLogEvent(HycoEvent event, PetscBool begin)
 PetscErrorCode HycoLogStage(HycoStage stage, PetscBool begin)
 {
   PetscFunctionBegin;
-  if (!registered) PetscCall(Register());
+  if (!registered) PetscCall(LogRegister());
   stage_runs = begin ? stage_names[stage] + 5 : NULL; /* without "hyco" */
   if (begin)
     PetscCall(PetscLogStagePush(stages[stage]));

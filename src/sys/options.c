@@ -115,8 +115,8 @@ void HycoOptionsSetProbe(PetscErrorCode (*probe)(const char name[]))
   probe_all = probe;
 }
 
-/* With a database of this option alone, which nothing else can read. Those that print, and options of solvers inside others, are read late: they
-   count as read, as does one whose value is refused. */
+/* With a database of this option alone, which nothing else can read. Those that print, and options of solvers inside
+   others, are read late: they count as read, as does one whose value is refused. */
 PetscErrorCode HycoOptionsOfSolver(const char name[], PetscBool *prefix, PetscBool *reads)
 {
   static const char *const prefixes[] = {"hyco_mumps_",   "hyco_primal_", "hyco_norm_",   "hyco_tao_",
@@ -191,7 +191,7 @@ static PetscInt TooFar(const char *word)
 }
 
 /* The name becomes the nearest if it is nearer than *best. */
-static void Compare(const char *word, const char *name, PetscInt *best, const char **nearest)
+static void OptionsCompare(const char *word, const char *name, PetscInt *best, const char **nearest)
 {
   const PetscInt distance = EditDistance(word, name);
 
@@ -206,7 +206,7 @@ const char *HycoNearest(const char *word, PetscInt n, const char *const names[])
   const char *nearest = NULL;
   PetscInt best = TooFar(word);
 
-  for (PetscInt k = 0; k < n; k++) Compare(word, names[k], &best, &nearest);
+  for (PetscInt k = 0; k < n; k++) OptionsCompare(word, names[k], &best, &nearest);
   return nearest;
 }
 
@@ -223,7 +223,7 @@ const char *HycoOptionNearest(const char word[], const HycoOptionList *more)
       const char *name = lists[l]->option[k].name;
 
       if (strncasecmp(name, word, strlen(word)) == 0) return name; /* an abbreviation */
-      Compare(word, name, &best, &nearest);
+      OptionsCompare(word, name, &best, &nearest);
     }
   }
   return nearest;
@@ -272,7 +272,7 @@ static PetscErrorCode MakeOption(const char name[], const char text[], const cha
 }
 
 /* An option that is declared twice, for example by two types of a class, is listed once. */
-static PetscErrorCode Append(HycoOptionList *list, HycoOption *option)
+static PetscErrorCode OptionsAppend(HycoOptionList *list, HycoOption *option)
 {
   PetscFunctionBegin;
   for (PetscInt k = 0; k < list->n; k++) {
@@ -290,8 +290,8 @@ static PetscErrorCode Append(HycoOptionList *list, HycoOption *option)
 
 /* Records or prints the declaration, or finds the value's text: with the object's prefix, in its own options or, if
    it has a prefix, in the global ones. */
-static PetscErrorCode Find(HycoOptionItems items, const char name[], const char text[], const char form[],
-                           const char initial[], size_t room, const char **value, PetscBool *set)
+static PetscErrorCode OptionsFind(HycoOptionItems items, const char name[], const char text[], const char form[],
+                                  const char initial[], size_t room, const char **value, PetscBool *set)
 {
   const char *owner = items->object ? items->object->class_name : items->title;
   PetscBool help = PETSC_FALSE;
@@ -308,7 +308,7 @@ static PetscErrorCode Find(HycoOptionItems items, const char name[], const char 
     if (help)
       PetscCall((*PetscHelpPrintf)(items->comm, "  -%s%s %s: %s [%s]\n", items->prefix ? items->prefix : "",
                                    option.name, option.value, option.meaning, option.initial));
-    PetscCall(Append(recording ? recording : &told, &option));
+    PetscCall(OptionsAppend(recording ? recording : &told, &option));
   }
   if (recording) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscOptionsFindPair(items->options, items->prefix, name, value, set));
@@ -333,7 +333,7 @@ PetscErrorCode HycoOptionsReal_Private(HycoOptionItems items, const char name[],
   snprintf(initial, sizeof(initial), "%g", (double)*value);
   zero = strstr(initial, "e-0");
   if (zero) memmove(zero + 2, zero + 3, strlen(zero + 3) + 1); /* 1e-8, not 1e-08 */
-  PetscCall(Find(items, name, text, "<real>", initial, HYCO_LINE, &word, &given));
+  PetscCall(OptionsFind(items, name, text, "<real>", initial, HYCO_LINE, &word, &given));
   if (set) *set = given;
   if (!given) PetscFunctionReturn(PETSC_SUCCESS);
   /* The negated comparison also refuses not a number. */
@@ -356,7 +356,7 @@ PetscErrorCode HycoOptionsInt_Private(HycoOptionItems items, const char name[], 
 
   PetscFunctionBegin;
   snprintf(initial, sizeof(initial), "%ld", (long)*value);
-  PetscCall(Find(items, name, text, "<int>", initial, HYCO_LINE, &word, &given));
+  PetscCall(OptionsFind(items, name, text, "<int>", initial, HYCO_LINE, &word, &given));
   if (set) *set = given;
   if (!given) PetscFunctionReturn(PETSC_SUCCESS);
   errno = 0;
@@ -396,7 +396,7 @@ PetscErrorCode HycoOptionsBool_Private(HycoOptionItems items, const char name[],
   PetscBool given;
 
   PetscFunctionBegin;
-  PetscCall(Find(items, name, text, "<bool>", *value ? "true" : "false", HYCO_LINE, &word, &given));
+  PetscCall(OptionsFind(items, name, text, "<bool>", *value ? "true" : "false", HYCO_LINE, &word, &given));
   if (set) *set = given;
   if (!given) PetscFunctionReturn(PETSC_SUCCESS);
   if (word[0]) PetscCall(FindWord(items, name, word, words, &index));
@@ -420,7 +420,7 @@ PetscErrorCode HycoOptionsWord_Private(HycoOptionItems items, const char name[],
     if (k == *index) initial = words[k];
   }
   PetscCall(PetscStrlcat(form, ">", sizeof(form)));
-  PetscCall(Find(items, name, text, form, initial, HYCO_LINE, &word, &given));
+  PetscCall(OptionsFind(items, name, text, form, initial, HYCO_LINE, &word, &given));
   if (set) *set = given;
   if (!given) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(FindWord(items, name, word, words, &found));
@@ -435,7 +435,7 @@ PetscErrorCode HycoOptionsString_Private(HycoOptionItems items, const char name[
   PetscBool given;
 
   PetscFunctionBegin;
-  PetscCall(Find(items, name, text, "<text>", value, length, &word, &given));
+  PetscCall(OptionsFind(items, name, text, "<text>", value, length, &word, &given));
   if (set) *set = given;
   if (!given) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheckValue(word[0], "-%s%s needs a value", NAMED(items, name));
@@ -452,7 +452,7 @@ PetscErrorCode HycoOptionsList_Private(HycoOptionItems items, const char name[],
   PetscBool given;
 
   PetscFunctionBegin;
-  PetscCall(Find(items, name, text, "<list>", "none", 4 * HYCO_LINE, &word, &given));
+  PetscCall(OptionsFind(items, name, text, "<list>", "none", 4 * HYCO_LINE, &word, &given));
   if (set) *set = given;
   *n = 0;
   *list = NULL;
@@ -475,6 +475,6 @@ PetscErrorCode HycoOptionsName_Private(HycoOptionItems items, const char name[],
   PetscBool given;
 
   PetscFunctionBegin;
-  PetscCall(Find(items, name, text, "<viewer>", "", 4 * HYCO_LINE, &word, &given));
+  PetscCall(OptionsFind(items, name, text, "<viewer>", "", 4 * HYCO_LINE, &word, &given));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -118,7 +118,7 @@ PetscErrorCode HycoQueueGetGroup(HycoQueue q, MPI_Comm *group)
 
 /* Adds to a counter atomically; returns its former value. more = 0 reads. MPI_Fetch_and_op() needs no lock between
    ranks. */
-static PetscErrorCode Add(HycoQueue q, PetscInt counter, PetscInt more, PetscInt *before)
+static PetscErrorCode QueueAdd(HycoQueue q, PetscInt counter, PetscInt more, PetscInt *before)
 {
   PetscFunctionBegin;
   if (q->window != MPI_WIN_NULL) {
@@ -138,12 +138,12 @@ static PetscErrorCode NextKind(HycoQueue q)
   PetscInt begun, most = 0;
 
   PetscFunctionBegin;
-  PetscCall(Add(q, BEGUN, 1, &begun));
+  PetscCall(QueueAdd(q, BEGUN, 1, &begun));
   q->kind = begun < q->n_kinds ? begun : -1;
   for (PetscInt k = 0; k < q->n_kinds && begun >= q->n_kinds; k++) {
     PetscInt taken, left;
 
-    PetscCall(Add(q, N_COUNTERS + k, 0, &taken));
+    PetscCall(QueueAdd(q, N_COUNTERS + k, 0, &taken));
     left = q->first[k + 1] - q->first[k] - taken;
     if (left <= most) continue;
     most = left;
@@ -161,19 +161,19 @@ static PetscErrorCode TakeTask(HycoQueue q, PetscInt *task)
   PetscFunctionBegin;
   *task = -1;
   /* Taking the next task says that the former is done. */
-  if (q->busy) PetscCall(Add(q, DONE, 1, &done));
-  PetscCall(Add(q, FAILED, 0, &failed));
+  if (q->busy) PetscCall(QueueAdd(q, DONE, 1, &done));
+  PetscCall(QueueAdd(q, FAILED, 0, &failed));
   if (failed) PetscFunctionReturn(PETSC_SUCCESS);
   if (q->kind < 0) PetscCall(NextKind(q));
   while (q->kind >= 0 && *task < 0) {
-    PetscCall(Add(q, N_COUNTERS + q->kind, 1, &at));
+    PetscCall(QueueAdd(q, N_COUNTERS + q->kind, 1, &at));
     if (q->first[q->kind] + at < q->first[q->kind + 1])
       *task = q->order[q->first[q->kind] + at];
     else
       PetscCall(NextKind(q));
   }
   if (*task >= 0) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Add(q, DONE, 0, &done));
+  PetscCall(QueueAdd(q, DONE, 0, &done));
   q->n_left = q->first[q->n_kinds] - done;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -194,7 +194,7 @@ PetscErrorCode HycoQueueDone(HycoQueue q, PetscInt *n)
 {
   PetscFunctionBegin;
   HycoCheckGiven(q);
-  PetscCall(Add(q, DONE, 0, n));
+  PetscCall(QueueAdd(q, DONE, 0, n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -203,7 +203,7 @@ PetscErrorCode HycoQueueNumber(HycoQueue q, PetscInt *number, PetscInt *group)
 {
   PetscFunctionBegin;
   HycoCheckGiven(q);
-  PetscCall(Add(q, EVENTS, 1, number));
+  PetscCall(QueueAdd(q, EVENTS, 1, number));
   ++*number;
   *group = q->color;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -229,7 +229,7 @@ PetscErrorCode HycoQueueHear(HycoQueue q)
 
   PetscFunctionBegin;
   HycoCheckGiven(q);
-  if (q->rank == 0) PetscCall(Add(q, FAILED, 0, &failed));
+  if (q->rank == 0) PetscCall(QueueAdd(q, FAILED, 0, &failed));
   PetscCallMPI(MPI_Bcast(&failed, 1, MPIU_INT, 0, q->group));
   q->told = (PetscBool)(failed > 0);
   HycoCheck(!failed, "another group of ranks has failed");
@@ -244,7 +244,7 @@ PetscErrorCode HycoQueueEnd(HycoQueue q, PetscErrorCode error)
   PetscFunctionBegin;
   HycoCheckGiven(q);
   if (!error || q->told) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Add(q, FAILED, 1, &before));
+  PetscCall(QueueAdd(q, FAILED, 1, &before));
   PetscCall(error);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

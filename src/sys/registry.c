@@ -18,9 +18,9 @@ static PetscErrorCode ForgetAll(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The names are kept beside PETSc's list, which can be searched but not listed in an order; a name that is registered again
-   replaces its function. */
-static PetscErrorCode Add(HycoRegistry *r, const char name[], HycoVoidFn *create)
+/* The names are kept beside PETSc's list, which can be searched but not listed in an order; a name that is registered
+   again replaces its function. */
+static PetscErrorCode RegistryAdd(HycoRegistry *r, const char name[], HycoVoidFn *create)
 {
   HycoVoidFn *former;
   PetscInt k;
@@ -38,7 +38,7 @@ static PetscErrorCode Add(HycoRegistry *r, const char name[], HycoVoidFn *create
 
 /* Every registry is forgotten in PetscFinalize(), so that a program can initialise PETSc again. Registries are static
    objects; each is chained in once. */
-static PetscErrorCode Begin(HycoRegistry *r)
+static PetscErrorCode RegistryBegin(HycoRegistry *r)
 {
   PetscFunctionBegin;
   if (r->begun) PetscFunctionReturn(PETSC_SUCCESS);
@@ -56,8 +56,8 @@ PetscErrorCode HycoRegistryAdd(HycoRegistry *r, const char name[], HycoVoidFn *c
   PetscFunctionBegin;
   HycoCheckGiven(name);
   HycoCheckGiven(create);
-  PetscCall(Begin(r));
-  PetscCall(Add(r, name, create));
+  PetscCall(RegistryBegin(r));
+  PetscCall(RegistryAdd(r, name, create));
   PetscCall(HycoOptionsForgetTable());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -65,7 +65,7 @@ PetscErrorCode HycoRegistryAdd(HycoRegistry *r, const char name[], HycoVoidFn *c
 PetscErrorCode HycoRegistryFind_Private(HycoRegistry *r, const char name[], HycoVoidFn **create)
 {
   PetscFunctionBegin;
-  PetscCall(Begin(r));
+  PetscCall(RegistryBegin(r));
   PetscCall(PetscFunctionListFind(r->create, name, create));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -74,7 +74,7 @@ PetscErrorCode HycoRegistryFind_Private(HycoRegistry *r, const char name[], Hyco
 PetscErrorCode HycoRegistryNames(HycoRegistry *r, PetscInt *n, const char *const **names)
 {
   PetscFunctionBegin;
-  PetscCall(Begin(r));
+  PetscCall(RegistryBegin(r));
   if (n) *n = r->n;
   *names = (const char *const *)r->name;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -87,7 +87,7 @@ PetscErrorCode HycoRegistryList(HycoRegistry *r, const char name[], char list[HY
   const char *near;
 
   PetscFunctionBegin;
-  PetscCall(Begin(r));
+  PetscCall(RegistryBegin(r));
   list[0] = '\0';
   for (PetscInt k = 0; k < r->n; k++) PetscCall(HycoListAdd(list, k + 1 < r->n ? ", " : " or ", r->name[k]));
   near = HycoNearest(name, r->n, (const char *const *)r->name);

@@ -126,7 +126,7 @@ static double Seconds(void)
 static PetscErrorCode TestSealTime(void)
 {
   const PetscInt n = 37000000 / 8;
-  unsigned char seal[HYCO_SEAL];
+  unsigned char seal[HYCO_CHECKSUM];
   double written, seal_written, read, seal_read;
   PetscReal *v;
   size_t size;
@@ -142,7 +142,7 @@ static PetscErrorCode TestSealTime(void)
   PetscCall(HycoH5Close(&h, PETSC_TRUE));
   written += Seconds();
   seal_written = -Seconds();
-  HycoSealMake(v, (size_t)n * sizeof(*v), seal);
+  HycoChecksumMake(v, (size_t)n * sizeof(*v), seal);
   seal_written += Seconds();
   read = -Seconds();
   PetscCall(HycoH5Open(path, &h));
@@ -150,7 +150,7 @@ static PetscErrorCode TestSealTime(void)
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
   read += Seconds();
   seal_read = -Seconds();
-  PetscCall(HycoSealCheck(path, &size, &sealed));
+  PetscCall(HycoChecksumCheck(path, &size, &sealed));
   seal_read += Seconds();
   CHECK(sealed && v[1] == 0.5, "what was written is not what is read");
   CHECK(seal_written < 1 && seal_read < 1, "the seal takes %g s to make, %g s to check", seal_written, seal_read);

@@ -59,8 +59,8 @@ static void ReadGood(const char name[], Good *g)
   g->bytes = malloc(g->size);
   if (!g->bytes || fread(g->bytes, 1, g->size, file) != g->size) abort();
   fclose(file);
-  g->sealed = g->size > HYCO_SEAL && !memcmp(g->bytes + g->size - HYCO_SEAL, "hyco-sum", 8);
-  if (g->sealed) g->size -= HYCO_SEAL;
+  g->sealed = g->size > HYCO_CHECKSUM && !memcmp(g->bytes + g->size - HYCO_CHECKSUM, "hyco-sum", 8);
+  if (g->sealed) g->size -= HYCO_CHECKSUM;
   h = H5Fopen(file_name, H5F_ACC_RDONLY, H5P_DEFAULT);
   if (h < 0 || HycoH5Visit(h, NoteSet, g) < 0) abort();
   H5Fclose(h);
@@ -80,7 +80,7 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 
 static void WriteChanged(const Good *g, const uint8_t *data, size_t size)
 {
-  uint8_t *bytes = malloc(g->size + HYCO_SEAL);
+  uint8_t *bytes = malloc(g->size + HYCO_CHECKSUM);
 
   if (!bytes) abort();
   memcpy(bytes, g->bytes, g->size);
@@ -90,8 +90,8 @@ static void WriteChanged(const Good *g, const uint8_t *data, size_t size)
 
     memcpy(bytes + s->at + item * s->item, data + 4, s->item < 8 ? s->item : 8);
   }
-  if (g->sealed) HycoSealMake(bytes, g->size, bytes + g->size);
-  FuzzWrite(path, bytes, g->size + (g->sealed ? HYCO_SEAL : 0));
+  if (g->sealed) HycoChecksumMake(bytes, g->size, bytes + g->size);
+  FuzzWrite(path, bytes, g->size + (g->sealed ? HYCO_CHECKSUM : 0));
   free(bytes);
 }
 

@@ -51,7 +51,7 @@ static void CutOut(Input *out, size_t at, size_t size)
 /* One change of `out`; `other` is an input to take bytes from. */
 static void Change(Input *out, const Input *other, unsigned short state[3])
 {
-  static const char telling[] = "\0\377\1 \n-.9e/\":{[$x";
+  static const char explanatory[] = "\0\377\1 \n-.9e/\":{[$x";
   const size_t at = Draw(state, out->size + 1), from = Draw(state, other->size + 1);
 
   switch (Draw(state, 6)) {
@@ -59,7 +59,7 @@ static void Change(Input *out, const Input *other, unsigned short state[3])
     if (at < out->size) out->data[at] ^= (uint8_t)(1 << Draw(state, 8));
     break;
   case 1:
-    if (at < out->size) out->data[at] = (uint8_t)telling[Draw(state, sizeof(telling) - 1)];
+    if (at < out->size) out->data[at] = (uint8_t)explanatory[Draw(state, sizeof(explanatory) - 1)];
     break;
   case 2:
     CutOut(out, at, 1 + Draw(state, 40));
@@ -68,7 +68,7 @@ static void Change(Input *out, const Input *other, unsigned short state[3])
     Insert(out, at, other->data + from, Draw(state, (other->size - from < 60 ? other->size - from : 60) + 1));
     break;
   case 4:
-    Insert(out, at, (const uint8_t *)telling + Draw(state, sizeof(telling) - 1), 1);
+    Insert(out, at, (const uint8_t *)explanatory + Draw(state, sizeof(explanatory) - 1), 1);
     break;
   default:
     if (Draw(state, 8) == 0) out->size = at;

@@ -206,6 +206,12 @@ class Sources(unittest.TestCase):
             for option in re.findall(r' -(\w+)', used[2]):
                 self.assertTrue(option in listed or re.sub('_[^_]+$', '_NAME', option) in listed or option == 'n', f'{command}: {option}')
 
+    def test_names(self):
+        """A static function has a name of two words or more, which a backtrace and a profile can tell apart; lines end at column 120."""
+        for path in sources() + glob.glob(os.path.join(SOURCE, 'include', '**', '*.h'), recursive=True):
+            self.assertEqual(re.findall(r'^static [\w *]*[ *]([A-Za-z][a-z0-9]*)\(', code(path), flags=re.M), [], path)
+            self.assertEqual([line for line in text(path).splitlines() if len(line) > 120], [], path)
+
     def test_public_header(self):
         """include/hyco.h compiles alone, in C and in C++, without the private headers."""
         flags = subprocess.run(['pkg-config', '--cflags', 'petsc', 'slepc'], capture_output=True, text=True, check=True,

@@ -177,7 +177,7 @@ static PetscErrorCode TestUnseen(HycoScene scene)
   PetscFunctionBegin;
   PetscCall(HycoSamplesCreate(scene, &samples));
   PetscCall(HycoSamplesAddGrid(samples, counts, PETSC_FALSE));
-  PetscCall(HycoSamplesUnseen(samples, 0, 40, 3, NULL, &unseen));
+  PetscCall(HycoSamplesOutsideTraining(samples, 0, 40, 3, NULL, &unseen));
   PetscCall(HycoSamplesGet(unseen, &n, NULL, &mu));
   CHECK(n == 40, "expected 40 unseen points, found %d", (int)n);
   for (PetscInt k = 0; k < n; k++) {
@@ -192,7 +192,7 @@ static PetscErrorCode TestUnseen(HycoScene scene)
   for (int q = 0; q < 4; q++) CHECK(face[q] == 2 || face[q] == 3, "face %d has %d of 10", q, (int)face[q]);
   CHECK(ends[0] == 26 && ends[1] == 10 && ends[2] == 4, "expected 26 inside, 10 on faces, 4 corners, found %d, %d, %d",
         (int)ends[0], (int)ends[1], (int)ends[2]);
-  PetscCall(HycoSamplesUnseen(samples, 24, 16, 3, NULL, &more));
+  PetscCall(HycoSamplesOutsideTraining(samples, 24, 16, 3, NULL, &more));
   PetscCall(HycoSamplesGet(more, &m, NULL, &nu));
   CHECK(m == 16, "expected 16 more, found %d", (int)m);
   for (PetscInt k = 0; k < m; k++)
@@ -220,7 +220,7 @@ static PetscErrorCode TestSeenCorners(HycoScene scene)
   PetscFunctionBegin;
   PetscCall(HycoSamplesCreate(scene, &samples));
   for (int k = 0; k < 3; k++) PetscCall(HycoSamplesAddPoint(samples, corner[k]));
-  PetscCall(HycoSamplesUnseen(samples, 0, 12, 1, NULL, &unseen));
+  PetscCall(HycoSamplesOutsideTraining(samples, 0, 12, 1, NULL, &unseen));
   PetscCall(HycoSamplesExcept(unseen, samples, &rest));
   PetscCall(HycoSamplesGet(rest, &n, NULL, &mu));
   CHECK(n == 12, "expected 12 unseen points, found %d", (int)n);
@@ -248,7 +248,7 @@ static PetscErrorCode TestGroups(HycoScene scene)
   PetscFunctionBegin;
   PetscCall(HycoSamplesCreate(scene, &samples));
   PetscCall(HycoSamplesAddGrid(samples, counts, PETSC_FALSE));
-  PetscCall(HycoSamplesUnseen(samples, 0, 48, 3, slow, &unseen));
+  PetscCall(HycoSamplesOutsideTraining(samples, 0, 48, 3, slow, &unseen));
   PetscCall(HycoSamplesDropTwins(unseen, NULL));
   PetscCall(HycoSamplesGet(unseen, &n, NULL, &mu));
   CHECK(n == 48, "expected 48 unseen points, found %d", (int)n);

@@ -1,4 +1,5 @@
-/* Expressions of a scene in reverse Polish notation, each until its END, and the functions of the parameters made of them. */
+/* Expressions of a scene in reverse Polish notation, each until its END, and the functions of the parameters made of
+   them. */
 #ifndef HYCO_EXPRESSION
 #define HYCO_EXPRESSION
 #include <math.h>

@@ -1,8 +1,8 @@
 /*
-  Bodies that creep or yield. alpha, the coefficients of their modes, is one more part of z: q has - P^T alpha, and the values
-  have terms of it. What the stresses at chosen points lack of elastic ones, s, gives alpha = T^T s. As in the library's model
-  Newton's method solves this where the forces are linear in alpha, by their derivative at the contacts' solution for the
-  last alpha, until the solution for its alpha has these forces.
+  Bodies that creep or yield. alpha, the coefficients of their modes, is one more part of z: q has - P^T alpha, and the
+  values have terms of it. What the stresses at chosen points lack of elastic ones, s, gives alpha = T^T s. As in the
+  library's model Newton's method solves this where the forces are linear in alpha, by their derivative at the contacts'
+  solution for the last alpha, until the solution for its alpha has these forces.
 */
 #include "laws.h"
 
@@ -74,8 +74,8 @@ static double elastic_entry(int ns, double young, double poisson, int r, int c)
   return (r < 3 && c < 3 ? lame : 0) + (r != c ? 0 : r < 3 ? 2 * shear : shear);
 }
 
-/* The laws at points from .. to - 1, at o->strain: o->lost, o->size of its terms, their state at the end; softer: C - C_t.
-   Returns 0 where a law has no solution. */
+/* The laws at points from .. to - 1, at o->strain: o->lost, o->size of its terms, their state at the end; softer: C -
+   C_t. Returns 0 where a law has no solution. */
 static int evaluate_laws(const Model *m, Work *o, int from, int to, double *softer)
 {
   const int ns = m->n_strain;
@@ -131,7 +131,8 @@ static int evaluate_laws(const Model *m, Work *o, int from, int to, double *soft
   return 1;
 }
 
-/* The derivative of the forces by alpha, Z, at the solution of the contacts; with friction on the pieces of its law there. */
+/* The derivative of the forces by alpha, Z, at the solution of the contacts; with friction on the pieces of its law
+   there. */
 static void derive_forces(const Model *m, Work *o)
 {
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
@@ -150,7 +151,8 @@ static void derive_forces(const Model *m, Work *o)
   }
 }
 
-/* The linear map of the strains at the chosen points: strain_at + slope (alpha - alpha_at). Their terms are the first ones. */
+/* The linear map of the strains at the chosen points: strain_at + slope (alpha - alpha_at). Their terms are the first
+   ones. */
 static void take_map(const Model *m, Work *o)
 {
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts, l = (size_t)m->n_modes, terms = (size_t)m->n_terms;
@@ -245,8 +247,8 @@ static void take_tangent(const Model *m, Work *o)
   factor_rows(l, o->K, o->pivot_of_K);
 }
 
-/* find_lack() with the tangent that is kept, or a new one if there is none, or if it did not reduce what was lacking before;
-   always: in any case. */
+/* find_lack() with the tangent that is kept, or a new one if there is none, or if it did not reduce what was lacking
+   before; always: in any case. */
 static int find_lack_or_renew(const Model *m, Work *o, int always, double *norm)
 {
   const double before = *norm;
@@ -320,8 +322,8 @@ static double solve_flow(const Model *m, Work *o, int *iterations)
   return o->easy ? kkt : search_alpha(m, o, 1, iterations);
 }
 
-/* The laws at all points, and what the values lack by them. Returns 0 where a law has no solution, or a point deforms too much
-   in the step. */
+/* The laws at all points, and what the values lack by them. Returns 0 where a law has no solution, or a point deforms
+   too much in the step. */
 static int settle(const Model *m, Work *o)
 {
   const size_t ns = (size_t)m->n_strain;

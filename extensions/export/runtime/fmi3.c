@@ -1,8 +1,8 @@
 /*
   An exported model as an FMU for co-simulation, FMI 3.0, declared here as its standard has it. Variables: time (0), the
-  parameters as inputs (1, ...), the outputs, the KKT residual. model.h, written by scripts/fmu, names the model: MODEL(predict)
-  is its function, or with MODEL_PATH MODEL(step): of a history, whose state a step of the FMU advances. FMI gives more than
-  that uses: some parameters are unused.
+  parameters as inputs (1, ...), the outputs, the KKT residual. model.h, written by scripts/fmu, names the model:
+  MODEL(predict) is its function, or with MODEL_PATH MODEL(step): of a history, whose state a step of the FMU advances.
+  FMI gives more than that uses: some parameters are unused.
 */
 #include "model.h"
 #include <stdbool.h>

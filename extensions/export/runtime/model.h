@@ -12,15 +12,16 @@ enum { OK, OUTSIDE, DIVERGED, NO_MEMORY };                                      
 enum { SUM, LARGEST, SMALLEST, CLOSED, PRESSURE, PRESSURE_SMALLEST, RESULTANT, WORK }; /* kinds of output */
 enum { COMPONENT, NORM, MISES, PRINCIPAL }; /* what counts of an item; PRINCIPAL + k */
 
-/* An output: a number for each of n items, combined as its kind says. The items are places with `width` values each, from
-   value `first` on, or contacts, from `first` on in Model.contact; -1: always open. A RESULTANT: the value `width` (-1: 0) and the contacts'
-   forces along axis `of`, from 3 on the moments around it, times the weights of the contacts minus those of the masters,
-   which follow them by node. WORK: of friction, of blocks instead of contacts. */
+/* An output: a number for each of n items, combined as its kind says. The items are places with `width` values each,
+   from value `first` on, or contacts, from `first` on in Model.contact; -1: always open. A RESULTANT: the value `width`
+   (-1: 0) and the contacts' forces along axis `of`, from 3 on the moments around it, times the weights of the contacts
+   minus those of the masters, which follow them by node. WORK: of friction, of blocks instead of contacts. */
 typedef struct Output {
   int kind, of, n, width, first, weight; /* weight: place of the first in Model.weight; -1: all are 1, or as found */
 } Output;
 
-/* Places first .. first + n - 1, which have the flexibility (n x n) from `at` on in Model.flexibility, times a value. */
+/* Places first .. first + n - 1, which have the flexibility (n x n) from `at` on in Model.flexibility, times a
+   value. */
 typedef struct {
   int first, n, value, at;
 } Block;
@@ -57,7 +58,8 @@ typedef struct {
 /* Expressions of a body that flows: the constants of its law, then these. */
 enum { TEMPERATURE = 8, EXPANSION, REFERENCE, SLOTS };
 
-/* Points first .. first + n - 1 of a body that flows: the rule of its law; alike: all have the expressions of the first one. */
+/* Points first .. first + n - 1 of a body that flows: the rule of its law; alike: all have the expressions of the first
+   one. */
 typedef struct {
   int rule, first, n, alike;
 } Flowing;
@@ -86,8 +88,8 @@ typedef struct {
   DATA int *normal;            /* by row: it is one; NULL: all are */
   DATA int *table;             /* by table: its first row, with the end; rows: */
   DATA double *table_t, *table_value, *stop;
-  /* Bodies that flow: their modes; points with laws, those whose increments bound a step, those that give alpha, each part of
-     the one before; components of their strains, which are the first values, point by point; what follows. */
+  /* Bodies that flow: their modes; points with laws, those whose increments bound a step, those that give alpha, each
+     part of the one before; components of their strains, which are the first values, point by point; what follows. */
   int n_modes, n_points, n_settled, n_chosen, n_strain, n_flowing, n_lost, newton_most;
   double newton_rtol, most_increment;
   DATA Flowing *flowing;

@@ -1,7 +1,8 @@
 /*
-  Paths in time; a prediction without a history is a step from rest. A step with friction is w = q + M z as in runtime.c, with rows for the tangents of a
-  contact after that of its normal, whose w is the slip of the step: q has where the tangents were before. With Coulomb's
-  projection P of the library, F(z) = z - P(z - rho w) = 0 is solved by Newton's method with a search along its steps.
+  Paths in time; a prediction without a history is a step from rest. A step with friction is w = q + M z as in
+  runtime.c, with rows for the tangents of a contact after that of its normal, whose w is the slip of the step: q has
+  where the tangents were before. With Coulomb's projection P of the library, F(z) = z - P(z - rho w) = 0 is solved by
+  Newton's method with a search along its steps.
 */
 
 static size_t state_size(const Model *m)
@@ -173,8 +174,8 @@ static double measure(const Model *m, Work *o, const double z[], const double w[
   return sqrt(sum);
 }
 
-/* The unknowns on the pieces of P at y (stick: all contacts stick): rows of DP, o->D by block, that are not 0; `aimed` is z
-   with 0 in the others. Returns their number. */
+/* The unknowns on the pieces of P at y (stick: all contacts stick): rows of DP, o->D by block, that are not 0; `aimed`
+   is z with 0 in the others. Returns their number. */
 static int find_unknowns(const Model *m, Work *o, const double z[], int stick)
 {
   const int p = m->n_motions;
@@ -214,7 +215,8 @@ static int block_of(const Model *m, int row)
   return k;
 }
 
-/* The matrix of the unknowns on the pieces of P at y, factored; returns their number, and `aimed` as find_unknowns(). */
+/* The matrix of the unknowns on the pieces of P at y, factored; returns their number, and `aimed` as
+   find_unknowns(). */
 static size_t factor_pieces(const Model *m, Work *o, const double z[], int stick)
 {
   const int p = m->n_motions;
@@ -365,8 +367,8 @@ static void close_gaps(const Model *m, Work *o)
   backward(p, p, o->S, o->z);
 }
 
-/* From the forces before (again: the present ones) or, where their residual is smaller, those extrapolated. Bodies that contact alone holds begin with
-   no forces if no load acts on them. */
+/* From the forces before (again: the present ones) or, where their residual is smaller, those extrapolated. Bodies that
+   contact alone holds begin with no forces if no load acts on them. */
 static int from_forces(const Model *m, Work *o, int again, int *iterations)
 {
   const State *s = &o->s;
@@ -389,8 +391,8 @@ static int from_forces(const Model *m, Work *o, int again, int *iterations)
   return iterate(m, o, iterations);
 }
 
-/* A step with friction: from the forces of the last one; from the solution without friction; from that in which all contacts
-   stick, and its admissible forces. Returns the residual. */
+/* A step with friction: from the forces of the last one; from the solution without friction; from that in which all
+   contacts stick, and its admissible forces. Returns the residual. */
 static double solve_slip(const Model *m, Work *o, int again, int *iterations)
 {
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
@@ -491,8 +493,9 @@ static int try_step(const Model *m, Work *o, const double mu[], double t, double
   return predict(m, o, o->v, out, kkt, iterations);
 }
 
-/* From the state's time to t, where the parameters are mu; until there they go on a straight line. Steps end at the rows of
-   tables; they are halved where they have no solution, and grow, as in the library. The state is as before if there is none. */
+/* From the state's time to t, where the parameters are mu; until there they go on a straight line. Steps end at the
+   rows of tables; they are halved where they have no solution, and grow, as in the library. The state is as before if
+   there is none. */
 static int advance(const Model *m, Work *o, const double mu[], double t, double state[], double out[], double *kkt,
                    int *iterations)
 {

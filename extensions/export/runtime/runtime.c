@@ -6,8 +6,8 @@
 
   and values of the displacements and stresses, affine in z, from which the outputs follow. q, A, W and the values are
   combinations of functions of the parameters. Where surfaces move past each other they are those of forces at places of
-  the surfaces, of which the contacts' rows B make those of the contacts: L acts by B^T L, W is the sum over the bodies of
-  B_b C_b B_b^T.
+  the surfaces, of which the contacts' rows B make those of the contacts: L acts by B^T L, W is the sum over the bodies
+  of B_b C_b B_b^T.
 */
 #include "expression.h"
 #include "model.h"
@@ -17,8 +17,8 @@
 /* Arrays in the caller's memory. */
 typedef struct {
   double *atom, *f, *q, *w, *z, *value; /* expressions and functions; n_motions + n_contacts; values */
-  /* W: columns, as far as they are made. L: factor of W on the closed contacts, in rows of n_contacts; V = L^-1 A^T; S: of
-     V^T V */
+  /* W: columns, as far as they are made. L: factor of W on the closed contacts, in rows of n_contacts; V = L^-1 A^T; S:
+     of V^T V */
   double *W, *A, *L, *V, *S, *last, *y;
   double pin; /* of A^T (q_x + A L), which is 0, in w_L: a body's pins have no flexibility of their own */
   double *at_places, *push, *sum; /* n_motions + n_places: w for z = 0, z; n_terms */
@@ -27,11 +27,11 @@ typedef struct {
   Met *met;              /* by contact; of moved surfaces, like */
   int *touched, *before; /* places of moved surfaces that rows have; by place: how many of these precede it */
   Room room;
-  /* p + n: scales; y = z - rho w at the step's begin, and where it is measured; where Newton's step ends; trials; the right
-     side */
+  /* p + n: scales; y = z - rho w at the step's begin, and where it is measured; where Newton's step ends; trials; the
+     right side */
   double *rho, *from, *from_next, *aimed, *trial, *trial_w, *rhs;
-  double *D, *J, *v, *saved,
-      largest; /* by block; of unknowns; variables, then parameters on the way; a state; a force */
+  /* by block; of unknowns; variables, then parameters on the way; a state; a force */
+  double *D, *J, *v, *saved, largest;
   int *unknown, *pivot;
   double t; /* the step's end */
   State s;  /* its begin, and then its end */
@@ -187,7 +187,8 @@ static void fill_moved(const Model *m, const Work *o, const Met *a, double y[], 
   }
 }
 
-/* W with all contacts of those that are closed, or of all. Where rows are fixed the triangles are read in the order of memory. */
+/* W with all contacts of those that are closed, or of all. Where rows are fixed the triangles are read in the order of
+   memory. */
 static void make_columns(const Model *m, Work *o, int all)
 {
   const size_t n = (size_t)m->n_contacts, size = n * (n + 1) / 2;
@@ -316,9 +317,9 @@ static void subtract(size_t n, size_t row_length, const double b[], double rows[
   r3[n] -= s[6] + s[7];
 }
 
-/* Lower factor, row by row, of the matrix in the lower triangle of a: n rows of the length `row_length`, of which the first
-   `done` are factored. A row that depends on the former ones has an infinite pivot, so that its unknown is 0. Returns the
-   number of such rows. */
+/* Lower factor, row by row, of the matrix in the lower triangle of a: n rows of the length `row_length`, of which the
+   first `done` are factored. A row that depends on the former ones has an infinite pivot, so that its unknown is 0.
+   Returns the number of such rows. */
 static int factorise(size_t n, size_t row_length, size_t done, double a[])
 {
   int dependent = 0;
@@ -367,8 +368,8 @@ static void backward(size_t n, size_t row_length, const double a[], double x[])
   }
 }
 
-/* The closed contacts in `at`, those of the last set first and in their order: the rows of the factor stay up to the first
-   that has left. Returns how many. */
+/* The closed contacts in `at`, those of the last set first and in their order: the rows of the factor stay up to the
+   first that has left. Returns how many. */
 static size_t arrange(const Model *m, Work *o)
 {
   size_t same = (size_t)o->n_closed;
@@ -417,8 +418,8 @@ static void solve_factored(const Model *m, const Work *o, double y[], double x[]
   backward(k, n, o->L, y);
 }
 
-/* z with the closed contacts at gap 0 and the others without force; epsilon, delta: of epsilon (x - last) added to w_x, and
-   delta (L - last) to w_L. Returns 0 if the closed contacts do not hold the bodies. */
+/* z with the closed contacts at gap 0 and the others without force; epsilon, delta: of epsilon (x - last) added to w_x,
+   and delta (L - last) to w_L. Returns 0 if the closed contacts do not hold the bodies. */
 static int solve_set(const Model *m, Work *o, double epsilon, double delta)
 {
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
@@ -496,8 +497,8 @@ static int change(const Model *m, Work *o, double gap, double force, int one)
   return n;
 }
 
-/* The active set method, from the present set; after a number of iterations it changes one contact at a time (Murty's rule),
-   which ends. Returns 0 if it does not, or if the contacts do not hold the bodies. */
+/* The active set method, from the present set; after a number of iterations it changes one contact at a time (Murty's
+   rule), which ends. Returns 0 if it does not, or if the contacts do not hold the bodies. */
 static int search(const Model *m, Work *o, double epsilon, double delta, int *iterations)
 {
   double gap, force;
@@ -511,8 +512,8 @@ static int search(const Model *m, Work *o, double epsilon, double delta, int *it
   return 0;
 }
 
-/* The contacts that are closed at first: those at least half as deep as the deepest without forces, since on rounded surfaces
-   the others open again; with motions all, as an open set would let the bodies go. */
+/* The contacts that are closed at first: those at least half as deep as the deepest without forces, since on rounded
+   surfaces the others open again; with motions all, as an open set would let the bodies go. */
 static void start(const Model *m, Work *o)
 {
   double least = 0;
@@ -566,8 +567,8 @@ static double kkt_residual(const Model *m, Work *o)
   return most;
 }
 
-/* Where sets of the search let bodies go, or contacts depend on each other: the same with a small stiffness towards the last
-   motions and forces, which vanishes as these converge. Returns the KKT residual. */
+/* Where sets of the search let bodies go, or contacts depend on each other: the same with a small stiffness towards the
+   last motions and forces, which vanishes as these converge. Returns the KKT residual. */
 static double search_held(const Model *m, Work *o, int *iterations)
 {
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;

@@ -42,8 +42,8 @@ static void add_facets(const Surfaces *s, const Surface *of, const double X[], d
   }
 }
 
-/* Adds `scale` times a contact's normal at a node to its row, in the axes of the node's body; prescribed displacements go
-   to the gap. Returns 0 if the model does not know the node. */
+/* Adds `scale` times a contact's normal at a node to its row, in the axes of the node's body; prescribed displacements
+   go to the gap. Returns 0 if the model does not know the node. */
 static int add_node(const Surfaces *s, PetscInt node, double scale, const double value[], Met *met)
 {
   const double *Q = s->pose[node] < 0 ? NULL : value + s->pose[node];
@@ -102,7 +102,7 @@ static int meet(const Surfaces *s, const Facing *h, const Room *r, const double 
 
     HycoMasterSearchProject(&t, of, PETSC_FALSE, &at);
     if (at.n && (at.distance > s->reach[h - s->search] ||
-                 (HycoMasterSearchIsBeside(&t, of, &at) && HycoMasterSearchOnBorder(&t, &at))))
+                 (HycoMasterSearchIsOutside(&t, of, &at) && HycoMasterSearchOnBorder(&t, &at))))
       at.n = 0;
     m->n = 0;
     m->gap = 0;

@@ -2,7 +2,7 @@
   Mortar contacts: the gap of a slave node is the mean of the distance over the slave's facets around it, weighted by a
   dual function, so that a uniform pressure passes between meshes that do not match.
 */
-#include "../../facing.h"
+#include "../../surface_normals.h"
 #include "../../mortar.h"
 
 /* Refuses what the integrals do not cover. */
@@ -26,7 +26,8 @@ static PetscErrorCode CheckSupported(HycoContact c, HycoFE fe)
 }
 
 /* Fails for slave nodes without a facing part of the master, of which a scene that gives a tolerance may have some. */
-static PetscErrorCode CheckFacing(HycoContact c, HycoFE fe, const HycoPairs *p, PetscInt first, PetscReal tolerance)
+static PetscErrorCode CheckSurfaceNormals(HycoContact c, HycoFE fe, const HycoPairs *p, PetscInt first,
+                                          PetscReal tolerance)
 {
   const HycoMesh m = fe->mesh;
   PetscInt alone = 0, one = -1;
@@ -48,8 +49,8 @@ static PetscErrorCode CheckFacing(HycoContact c, HycoFE fe, const HycoPairs *p, 
            c->slave, c->master, stated >= 0 ? "larger " : "", c->name, c->master);
 }
 
-/* Whether a contact without a master is left out: one of several sides of its node of which another one has a master, or
-   on a surface that goes round an edge a node that does not look at the master. */
+/* Whether a contact without a master is left out: one of several sides of its node of which another one has a master,
+   or on a surface that goes round an edge a node that does not look at the master. */
 static PetscErrorCode IsDropped(HycoMasterSearch *t, const HycoQuery *query, const HycoPairs *p, PetscInt first,
                                 PetscInt k, PetscBool *dropped)
 {
@@ -136,23 +137,24 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
     tolerance = pairs->facts ? pairs->facts[index].small : HycoSurfaceTolerance(fe->mesh, g);
   }
   PetscCall(FindDrawn(c, fe, index, first, tolerance, pairs));
-  PetscCall(CheckFacing(c, fe, pairs, first, tolerance));
+  PetscCall(CheckSurfaceNormals(c, fe, pairs, first, tolerance));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* At moved nodes. */
-static PetscErrorCode Find(HycoContact c, HycoFE fe, const HycoPairs *of, PetscInt first, PetscInt last,
-                           HycoPairs *found)
+static PetscErrorCode MortarFind(HycoContact c, HycoFE fe, const HycoPairs *of, PetscInt first, PetscInt last,
+                                 HycoPairs *found)
 {
   PetscFunctionBegin;
   PetscCall(HycoMortarRows(c, fe, of, first, last, of->search[of->contact[first]].reach, found));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* At moved nodes a slave without facing facets has no masters, and no error: it may come back. integrated: gaps are sums over many nodes, so that touching surfaces need a threshold for zero. */
+/* At moved nodes a slave without facing facets has no masters, and no error: it may come back. integrated: gaps are
+   sums over many nodes, so that touching surfaces need a threshold for zero. */
 PetscErrorCode HycoContactCreate_Mortar(HycoContact contact)
 {
-  static const struct _HycoContactOps ops = {.setup = SetUp, .find = Find};
+  static const struct _HycoContactOps ops = {.setup = SetUp, .find = MortarFind};
 
   PetscFunctionBegin;
   PetscCall(HycoMasterSearchDeclare(contact));

@@ -1,5 +1,5 @@
 /* Pairs: the master of a slave node is one fixed node of the other surface. */
-#include "../../facing.h"
+#include "../../surface_normals.h"
 #include "../../master_search.h"
 
 /* Share of a slave's facet: the largest tangential distance of a pair's nodes on moved nodes. */
@@ -28,7 +28,7 @@ static PetscErrorCode AreMatched(const HycoMasterSearch *t, const HycoMatch *m, 
 }
 
 /* The largest distance of a pair's nodes along their normals: as given; else any, if the surfaces touch somewhere. */
-static PetscReal Farthest(PetscReal stated, const HycoMatch *m)
+static PetscReal PairFarthest(PetscReal stated, const HycoMatch *m)
 {
   if (stated >= 0) return stated;
   for (PetscInt k = 0; k < m->n; k++) {
@@ -60,7 +60,7 @@ static PetscErrorCode MatchAlong(HycoMasterSearch *t, HycoContact c, HycoMatch *
     /* Nodes whose nearest facet faces away need no partner: they are on a side that the contact does not meet. */
     needs[k] = (PetscBool)(!out || HycoDot(out, t->normal + 3 * nearest.patch) <= HYCO_OPPOSED);
   }
-  PetscCall(AreMatched(t, m, along, needs, Farthest(stated, m), &matched));
+  PetscCall(AreMatched(t, m, along, needs, PairFarthest(stated, m), &matched));
   for (PetscInt k = 0; matched && k < m->n; k++) {
     const PetscReal *out = HycoMasterSearchOutward(t, m->slave[k]);
 
@@ -109,7 +109,7 @@ static PetscErrorCode CheckMasters(const HycoMasterSearch *t, HycoContact c, con
 
 /* Nearest nodes, if they match one to one; else nodes along the normals, if these do. Coinciding meshes take the
    first way; the second is for gaps. */
-static PetscErrorCode Settle(HycoMasterSearch *t, HycoContact c, HycoMatch *m)
+static PetscErrorCode PairMatch(HycoMasterSearch *t, HycoContact c, HycoMatch *m)
 {
   PetscBool matched;
 
@@ -124,8 +124,8 @@ static PetscErrorCode Settle(HycoMasterSearch *t, HycoContact c, HycoMatch *m)
 }
 
 /* Without a stated tolerance a larger one cannot be advised. */
-static PetscErrorCode Remedy(HycoMasterSearch *t, HycoContact c, PetscInt n, const PetscInt missed[],
-                             char text[HYCO_LINE])
+static PetscErrorCode PairAdvice(HycoMasterSearch *t, HycoContact c, PetscInt n, const PetscInt missed[],
+                                 char text[HYCO_LINE])
 {
   PetscReal stated;
 
@@ -141,17 +141,17 @@ static PetscErrorCode Remedy(HycoMasterSearch *t, HycoContact c, PetscInt n, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Without a find method: a pair keeps its two nodes, and Verify() refuses maps that move them apart. */
+/* Without a find method: a pair keeps its two nodes, and PairVerify() refuses maps that move them apart. */
 static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs *pairs)
 {
   PetscFunctionBegin;
-  PetscCall(HycoMasterSearchMatch(c, fe, index, PETSC_TRUE, Settle, Remedy, pairs));
+  PetscCall(HycoMasterSearchMatch(c, fe, index, PETSC_TRUE, PairMatch, PairAdvice, pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Checks that the nodes of pairs still face each other after a map has moved them. */
-static PetscErrorCode Verify(HycoContact c, HycoFE fe, const HycoPairs *p, PetscInt first, PetscInt last,
-                             const PetscReal normal[])
+static PetscErrorCode PairVerify(HycoContact c, HycoFE fe, const HycoPairs *p, PetscInt first, PetscInt last,
+                                 const PetscReal normal[])
 {
   HycoMesh m = fe->mesh;
   PetscReal *size = NULL;
@@ -188,7 +188,7 @@ static PetscErrorCode Verify(HycoContact c, HycoFE fe, const HycoPairs *p, Petsc
 /* matched: masters are one to one, which the ranks of a distributed mesh must check together. */
 PetscErrorCode HycoContactCreate_Pair(HycoContact contact)
 {
-  static const struct _HycoContactOps ops = {.setup = SetUp, .verify = Verify};
+  static const struct _HycoContactOps ops = {.setup = SetUp, .verify = PairVerify};
 
   PetscFunctionBegin;
   PetscCall(HycoMasterSearchDeclare(contact));

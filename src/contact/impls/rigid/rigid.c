@@ -2,7 +2,7 @@
   A rigid body, whose surface is given by its gap like an obstacle's. It translates with one node of the mesh, which is
   the master of all of the contact's nodes: supports, forces and springs of that node are those of the body.
 */
-#include "../../facing.h"
+#include "../../surface_normals.h"
 
 /* All slaves have the same master with weight 1; the rank that has no slaves need not have the master's node. */
 static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs *pairs)

@@ -3,11 +3,11 @@
   the projection is computed on the moved nodes: a slave node has a master if the nearest point's normal opposes its
   own, that point is within reach, and the node is not past the master's border.
 */
-#include "../../facing.h"
+#include "../../surface_normals.h"
 #include "../../master_search.h"
 
 /* If the scene gives a largest distance of masters, a node that faces none within it has no contact. */
-static PetscErrorCode Settle(HycoMasterSearch *t, HycoContact c, HycoMatch *m)
+static PetscErrorCode SurfaceFind(HycoMasterSearch *t, HycoContact c, HycoMatch *m)
 {
   PetscReal stated;
 
@@ -23,8 +23,8 @@ static PetscErrorCode Settle(HycoMasterSearch *t, HycoContact c, HycoMatch *m)
 }
 
 /* What the user can do about nodes without a master. */
-static PetscErrorCode Remedy(HycoMasterSearch *t, HycoContact c, PetscInt n, const PetscInt missed[],
-                             char text[HYCO_LINE])
+static PetscErrorCode SurfaceAdvice(HycoMasterSearch *t, HycoContact c, PetscInt n, const PetscInt missed[],
+                                    char text[HYCO_LINE])
 {
   PetscBool facing = PETSC_FALSE;
   PetscReal farthest = 0;
@@ -50,17 +50,17 @@ static PetscErrorCode Remedy(HycoMasterSearch *t, HycoContact c, PetscInt n, con
 }
 
 /* On moved surfaces the position as drawn need not face anything: only the slaves are listed, without the judgement
-   that Settle() belongs to. */
+   that SurfaceFind() belongs to. */
 static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs *pairs)
 {
   PetscFunctionBegin;
-  PetscCall(
-      HycoMasterSearchMatch(c, fe, index, PETSC_FALSE, HycoPairsFollows(pairs, index) ? NULL : Settle, Remedy, pairs));
+  PetscCall(HycoMasterSearchMatch(c, fe, index, PETSC_FALSE, HycoPairsFollows(pairs, index) ? NULL : SurfaceFind,
+                                  SurfaceAdvice, pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The contacts first .. last - 1 of a moved surface in one tree, in their order, also without a master (n = 0): sizes stay
-   the same at every parameter. */
+/* The contacts first .. last - 1 of a moved surface in one tree, in their order, also without a master (n = 0): sizes
+   stay the same at every parameter. */
 static PetscErrorCode FindIn(HycoMasterSearch *t, const HycoPairs *of, PetscInt first, PetscInt last, HycoPairs *found)
 {
   const PetscInt index = of->contact[first];
@@ -87,8 +87,8 @@ static PetscErrorCode FindAll(HycoMasterSearch *t, const HycoPairs *of, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Find(HycoContact c, HycoFE fe, const HycoPairs *of, PetscInt first, PetscInt last,
-                           HycoPairs *found)
+static PetscErrorCode SurfaceFindMoved(HycoContact c, HycoFE fe, const HycoPairs *of, PetscInt first, PetscInt last,
+                                       HycoPairs *found)
 {
   HycoMasterSearch t;
   PetscInt edges;
@@ -102,7 +102,7 @@ static PetscErrorCode Find(HycoContact c, HycoFE fe, const HycoPairs *of, PetscI
 
 PetscErrorCode HycoContactCreate_Surface(HycoContact contact)
 {
-  static const struct _HycoContactOps ops = {.setup = SetUp, .find = Find};
+  static const struct _HycoContactOps ops = {.setup = SetUp, .find = SurfaceFindMoved};
 
   PetscFunctionBegin;
   PetscCall(HycoMasterSearchDeclare(contact));

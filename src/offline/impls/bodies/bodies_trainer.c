@@ -69,7 +69,7 @@ static PetscErrorCode SetFromOptions(HycoReducer t)
 }
 
 /* The data of a run; the options, in the same struct, stay. */
-static PetscErrorCode Reset(HycoReducer t)
+static PetscErrorCode BodiesTrainerReset(HycoReducer t)
 {
   HycoBodiesTraining s = (HycoBodiesTraining)t->training;
 
@@ -83,7 +83,7 @@ static PetscErrorCode Reset(HycoReducer t)
 
 /* Over paths the laws in few cells, unless an option names how. Which laws serve better shows only at held-out
    paths, so that a search tries both; "auto" would be one of them. */
-static const char *const *Variants(HycoReducer t)
+static const char *const *BodiesTrainerVariants(HycoReducer t)
 {
   static const char *const variants[] = {"interpolation", "cubature", NULL};
 
@@ -126,7 +126,7 @@ static PetscErrorCode TakeExact(HycoROM m, HycoSubstructures b)
 
 /* The model takes over what training has made: `bodies` moves, and the empty data of the new model go. Every
    contact is in A_lambda, since every force is exact or an unknown. */
-static PetscErrorCode Take(HycoROM m, HycoReducer t)
+static PetscErrorCode BodiesTrainerMove(HycoROM m, HycoReducer t)
 {
   HycoBodiesTraining s = (HycoBodiesTraining)t->training;
   HycoSubstructures none = (HycoSubstructures)m->model->data;
@@ -144,8 +144,8 @@ static PetscErrorCode Take(HycoROM m, HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Mean error of the training displacements, in which a path that does not reach its end counts as wrong by its size: one of
-   them does not make the others useless. -1: not known. */
+/* Mean error of the training displacements, in which a path that does not reach its end counts as wrong by its size:
+   one of them does not make the others useless. -1: not known. */
 static PetscErrorCode MeanError(HycoROM m, HycoReducer t, PetscReal *mean)
 {
   PetscInt n;
@@ -180,11 +180,11 @@ static PetscErrorCode CheckPath(HycoROM m, HycoReducer t)
 }
 
 /* Rank 0. The ops of paths before the data, because HycoReducerJudge() predicts with them. */
-static PetscErrorCode Build(HycoROM m, HycoReducer t)
+static PetscErrorCode BodiesTrainerBuild(HycoROM m, HycoReducer t)
 {
   PetscFunctionBegin;
   if (t->scene->n_times) PetscCall(HycoBodiesTakePath(m));
-  PetscCall(Take(m, t));
+  PetscCall(BodiesTrainerMove(m, t));
   if (t->scene->n_times) PetscCall(CheckPath(m, t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -218,7 +218,7 @@ static PetscReal PathCost(HycoReducer t)
 }
 
 /* The summary is a line for the user; the facts are the same numbers for scripts. */
-static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
+static PetscErrorCode BodiesTrainerReport(HycoReducer t, HycoROM m, HycoTraining *r)
 {
   HycoSubstructures b = (HycoSubstructures)m->model->data;
   const char *filled = "; displacements still need more modes than half of the samples, so that those away from the "
@@ -254,7 +254,7 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
 
 /* Of a prediction, so that a search can compare types: W of the closed contacts and its factor, then the modes on
    the model's mesh. */
-static PetscReal Cost(HycoReducer t, const HycoAttempt *a)
+static PetscReal BodiesTrainerCost(HycoReducer t, const HycoAttempt *a)
 {
   const PetscReal active = ACTIVE * (PetscReal)t->sizes[2], row = ENTRIES * active;
 
@@ -267,15 +267,15 @@ PetscErrorCode HycoTrainerCreate_Bodies(HycoTrainerOps *ops)
 {
   PetscFunctionBegin;
   *ops = (HycoTrainerOps){.setfromoptions = SetFromOptions,
-                          .reset = Reset,
+                          .reset = BodiesTrainerReset,
                           .begin = HycoBodiesBegin,
                           .modes = HycoBodiesModes,
-                          .build = Build,
-                          .report = Report,
-                          .cost = Cost,
+                          .build = BodiesTrainerBuild,
+                          .report = BodiesTrainerReport,
+                          .cost = BodiesTrainerCost,
                           .offers = HycoBodiesOffers,
                           .work = HycoBodiesOperations,
-                          .variants = Variants,
+                          .variants = BodiesTrainerVariants,
                           .setvariant = SetVariant};
   PetscFunctionReturn(PETSC_SUCCESS);
 }

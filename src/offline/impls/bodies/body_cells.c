@@ -88,8 +88,8 @@ static PetscErrorCode MarkInner(HycoReducer t, HycoBodiesFactor *factor, const P
 
 /* Joins more[] to in[], if there is room. Collective. in[] stays as it is if the unknowns inside would exceed their
    number. */
-static PetscErrorCode Join(HycoReducer t, HycoBodiesFactor *factor, PetscBool in[], PetscBool more[], PetscBool inner[],
-                           PetscBool *fits)
+static PetscErrorCode BodyCellsJoin(HycoReducer t, HycoBodiesFactor *factor, PetscBool in[], PetscBool more[],
+                                    PetscBool inner[], PetscBool *fits)
 {
   const PetscInt n = factor->fom->part->n_cells;
 
@@ -102,7 +102,7 @@ static PetscErrorCode Join(HycoReducer t, HycoBodiesFactor *factor, PetscBool in
 
 /* The cells of this rank's part. Collective. Outputs are in their order in the scene: one that does not fit is
    left out, the next may fit. Stress levels stop at the first that does not, since the lower ones contain it. */
-static PetscErrorCode Choose(HycoReducer t, HycoBodiesFactor *factor, PetscBool in[], PetscBool inner[])
+static PetscErrorCode BodyCellsChoose(HycoReducer t, HycoBodiesFactor *factor, PetscBool in[], PetscBool inner[])
 {
   HycoMesh m = factor->fom->part;
   PetscBool *more, fits = PETSC_TRUE;
@@ -111,13 +111,13 @@ static PetscErrorCode Choose(HycoReducer t, HycoBodiesFactor *factor, PetscBool 
   PetscCall(PetscMalloc1(m->n_cells + 1, &more));
   for (PetscInt k = 0; k < t->scene->n_quantities; k++) {
     HycoOnEach(HycoComm(t), HycoQuantityMarkCells(t->scene, m, k, more));
-    PetscCall(Join(t, factor, in, more, inner, &fits));
+    PetscCall(BodyCellsJoin(t, factor, in, more, inner, &fits));
   }
   fits = PETSC_TRUE;
   /* By levels and not cell by cell: the same choice on any number of ranks. */
   for (PetscReal least = 0.9; fits && least > LEAST_SCORE; least -= 0.1) {
     for (PetscInt e = 0; e < m->n_cells; e++) more[e] = (PetscBool)(factor->score[e] > least);
-    PetscCall(Join(t, factor, in, more, inner, &fits));
+    PetscCall(BodyCellsJoin(t, factor, in, more, inner, &fits));
   }
   PetscCall(PetscFree(more));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -150,7 +150,7 @@ static PetscErrorCode ShareCells(HycoReducer t, HycoMesh m, PetscBool in[])
 
 /* b->inner by body, and factor->row, from the marked unknowns. Collective. Ascending by number in the whole mesh
    within each body, whatever the partition: the order is that of the file. */
-static PetscErrorCode List(HycoReducer t, HycoBodiesFactor *factor, const PetscBool inner[])
+static PetscErrorCode BodyCellsList(HycoReducer t, HycoBodiesFactor *factor, const PetscBool inner[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   HycoMesh m = factor->fom->part;
@@ -238,7 +238,7 @@ static void MarkBare(HycoBodiesFactor *factor, const PetscBool in[])
 /* Leaves a node to the modes, of which a model has one at least: that which moves most. It is exact too, because its
    modes are all of its displacements. *released: there is one. Collective. Otherwise a small mesh could have all nodes
    exact, and a model without any mode is none. */
-static PetscErrorCode Release(HycoReducer t, HycoBodiesFactor *factor, PetscBool inner[], PetscBool *released)
+static PetscErrorCode BodyCellsRelease(HycoReducer t, HycoBodiesFactor *factor, PetscBool inner[], PetscBool *released)
 {
   HycoMesh m = factor->fom->part;
   const PetscInt dim = factor->fom->fe->dim;
@@ -272,7 +272,7 @@ PetscErrorCode HycoBodiesChooseCells(HycoReducer t, HycoBodiesFactor *factor)
   PetscCall(PetscMalloc1(fe->n_dof + 1, &inner));
   /* Known unknowns first: the cells are chosen among those that still need something. */
   PetscCall(MarkSurfaces(t, factor));
-  PetscCall(Choose(t, factor, in, inner));
+  PetscCall(BodyCellsChoose(t, factor, in, inner));
   PetscCall(ShareCells(t, factor->fom->part, in));
   PetscCall(MarkInner(t, factor, in, inner, &fits));
   MarkBare(factor, in);
@@ -282,11 +282,11 @@ PetscErrorCode HycoBodiesChooseCells(HycoReducer t, HycoBodiesFactor *factor)
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &left, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(t)));
   if (!fits) PetscCall(PetscArrayzero(inner, fe->n_dof)); /* of the cell that stands for none */
   /* If something is left outside the cells, modes are needed anyway, and surfaces keep theirs. */
-  if (fits && !left) PetscCall(Release(t, factor, inner, &released));
+  if (fits && !left) PetscCall(BodyCellsRelease(t, factor, inner, &released));
   if (!released) PetscCall(PetscArrayzero(factor->known, fe->n_dof));
   if (!released) PetscCall(PetscArrayzero(factor->bare, fe->n_dof));
   /* In ascending numbers on every rank: the rows of H are in this order. */
-  PetscCall(List(t, factor, inner));
+  PetscCall(BodyCellsList(t, factor, inner));
   for (PetscInt i = 0; i < fe->n_dof; i++) factor->bare[i] = (PetscBool)(factor->bare[i] || inner[i]);
   HycoFreeAll(&inner, &in);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,7 +1,8 @@
 /*
   The factors of the bodies. K couples no bodies: each has a factor of its own block with the unknowns of its surfaces
-  last, and is factored again only where its own parameters of theta change. The Schur complement is its flexibility C_b;
-  the unknowns that MUMPS pins for a body that contact alone holds are its isostatic supports, and give the rigid motions.
+  last, and is factored again only where its own parameters of theta change. The Schur complement is its flexibility
+  C_b; the unknowns that MUMPS pins for a body that contact alone holds are its isostatic supports, and give the rigid
+  motions.
 */
 #include <hycobodiestraining.h>
 #include <string.h>
@@ -9,7 +10,7 @@
 #define KEPT 0.3 /* share of the memory for the factors of samples that are kept */
 
 /* Exact equality: theta comes from Node() each time, by the same operations, and a factor serves no other point. */
-static PetscBool Same(PetscInt n, const PetscReal a[], const PetscReal b[])
+static PetscBool BodyFactorsIsSame(PetscInt n, const PetscReal a[], const PetscReal b[])
 {
   for (PetscInt p = 0; p < n; p++) {
     if (a[p] != b[p]) return PETSC_FALSE;
@@ -144,7 +145,7 @@ PetscErrorCode HycoBodiesMoveTo(HycoReducer t, HycoBodiesFactor *factor, const P
 
   PetscFunctionBegin;
   /* Positions are kept from sample to sample: the grid changes one axis at a time. */
-  if (factor->theta && Same(b->n_theta, theta, factor->theta)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (factor->theta && BodyFactorsIsSame(b->n_theta, theta, factor->theta)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(factor->theta));
   factor->assembled = PETSC_FALSE;
   /* All other parameters are those of the first point: they enter by poses and factors, exactly. */
@@ -228,7 +229,7 @@ static PetscErrorCode NextFactor(HycoBodiesFactor *factor, HycoBodyFactor *body)
   PetscCall(HycoSolverMemory(solver, &limit));
   for (PetscInt k = 0; k < factor->n; k++) bytes += factor->body[k].n_kept * factor->body[k].bytes;
   if (body->n_kept && bytes > KEPT * limit) {
-    /* theta NULL: not factored, so that Recall() does not find the old one while it is replaced. */
+    /* theta NULL: not factored, so that BodyFactorsRecall() does not find the old one while it is replaced. */
     PetscCall(PetscFree(body->kept[body->now].theta));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -241,7 +242,7 @@ static PetscErrorCode NextFactor(HycoBodiesFactor *factor, HycoBodyFactor *body)
 
 /* Before the factor. Collective. The pins before the analysis, which orders them into the Schur complement beside
    the surfaces' unknowns. A kept analysis of the same pattern is used again. */
-static PetscErrorCode Analyse(HycoBodiesFactor *factor, HycoBodyFactor *body)
+static PetscErrorCode BodyFactorsAnalyse(HycoBodiesFactor *factor, HycoBodyFactor *body)
 {
   PetscFunctionBegin;
   PetscCall(NextFactor(factor, body));
@@ -269,8 +270,8 @@ static PetscErrorCode TakeBlock(HycoSubstructures b, const HycoBodyFactor *body,
 }
 
 /* Factors a body; record: takes its block; NULL: it is not needed. theta: its own. Collective. */
-static PetscErrorCode Factor(HycoReducer t, HycoBodiesFactor *factor, PetscInt k, const PetscReal theta[],
-                             HycoBodyRecord *record)
+static PetscErrorCode BodyFactorsFactor(HycoReducer t, HycoBodiesFactor *factor, PetscInt k, const PetscReal theta[],
+                                        HycoBodyRecord *record)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   HycoBodyFactor *body = &factor->body[k];
@@ -283,9 +284,9 @@ static PetscErrorCode Factor(HycoReducer t, HycoBodiesFactor *factor, PetscInt k
   PetscFunctionBegin;
   PetscCall(AssembleAt(t, factor, theta));
   /* Before the first factor of all: their sizes are needed for CheckMemory(), which refuses before any factor. */
-  for (PetscInt j = 0; j < b->n && first; j++) PetscCall(Analyse(factor, &factor->body[j]));
+  for (PetscInt j = 0; j < b->n && first; j++) PetscCall(BodyFactorsAnalyse(factor, &factor->body[j]));
   if (first) PetscCall(CheckMemory(t, factor));
-  PetscCall(Analyse(factor, body));
+  PetscCall(BodyFactorsAnalyse(factor, body));
   n = (size_t)(body->p + b->body[k].n);
   PetscCall(PetscCalloc1(n * n + 1, &M));
   /* M is on every rank, and freed before an error returns: it is the largest array here. */
@@ -300,10 +301,10 @@ static PetscErrorCode Factor(HycoReducer t, HycoBodiesFactor *factor, PetscInt k
 }
 
 /* The factor of a body at its own theta, if it is kept. */
-static PetscBool Recall(HycoBodyFactor *body, PetscInt n, const PetscReal theta[])
+static PetscBool BodyFactorsRecall(HycoBodyFactor *body, PetscInt n, const PetscReal theta[])
 {
   for (PetscInt i = 0; i < body->n_kept; i++) {
-    if (!body->kept[i].theta || !Same(n, theta, body->kept[i].theta)) continue;
+    if (!body->kept[i].theta || !BodyFactorsIsSame(n, theta, body->kept[i].theta)) continue;
     body->now = i;
     body->direct = body->kept[i].direct;
     return PETSC_TRUE;
@@ -321,9 +322,9 @@ PetscErrorCode HycoBodiesRefactor(HycoReducer t, HycoBodiesFactor *factor, const
   for (PetscInt k = 0; k < factor->n; k++) {
     /* Only the axes that change this body: at others its factor is the same. */
     OwnTheta(b, k, theta, own);
-    if (!Recall(&factor->body[k], b->n_theta, own)) PetscCall(Factor(t, factor, k, own, NULL));
+    if (!BodyFactorsRecall(&factor->body[k], b->n_theta, own)) PetscCall(BodyFactorsFactor(t, factor, k, own, NULL));
   }
-  /* Factor() may have moved the nodes to positions of another body's sample. */
+  /* BodyFactorsFactor() may have moved the nodes to positions of another body's sample. */
   PetscCall(HycoBodiesMoveTo(t, factor, theta));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -480,7 +481,8 @@ PetscErrorCode HycoBodiesExtend(HycoSubstructures b, HycoBodiesFactor *factor, P
 /* -- records -- */
 
 /* R and the work of each vector of the basis of the loads on a body. Collective. */
-static PetscErrorCode Respond(HycoSubstructures b, HycoBodiesFactor *factor, PetscInt k, HycoBodyRecord *record)
+static PetscErrorCode BodyFactorsRespond(HycoSubstructures b, HycoBodiesFactor *factor, PetscInt k,
+                                         HycoBodyRecord *record)
 {
   const PetscInt n = b->body[k].n;
   PetscReal *u, *work;
@@ -560,8 +562,8 @@ static PetscErrorCode MakeRecord(HycoReducer t, HycoBodiesFactor *factor, PetscI
   r->work = array[3].value;
   PetscCall(HycoSnapshotsFindPiece(t->store, key, HYCO_PIECE_ARRAYS, array, &found));
   if (found) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Factor(t, factor, k, r->theta, r));
-  PetscCall(Respond(b, factor, k, r));
+  PetscCall(BodyFactorsFactor(t, factor, k, r->theta, r));
+  PetscCall(BodyFactorsRespond(b, factor, k, r));
   PetscCall(HycoSnapshotsKeepPiece(t->store, key, HYCO_PIECE_ARRAYS, array));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -579,7 +581,7 @@ static PetscErrorCode CondenseBody(HycoReducer t, HycoBodiesFactor *factor, Pets
   PetscFunctionBegin;
   OwnTheta(b, k, theta, own);
   for (*at = 0; *at < body->n_records; (*at)++) {
-    if (Same(b->n_theta, own, body->record[*at].theta)) PetscFunctionReturn(PETSC_SUCCESS);
+    if (BodyFactorsIsSame(b->n_theta, own, body->record[*at].theta)) PetscFunctionReturn(PETSC_SUCCESS);
   }
   *fresh = PETSC_TRUE;
   /* The number of motions is known by the first assembly. */

@@ -16,14 +16,16 @@
 #define MISSED       2e-4 /* or, at most UNTIL_SEEN times, while the modes miss this share of the displacements at a */
 #define UNTIL_SEEN   2    /* check: the estimate of u is then above what the search takes as accurate enough */
 #define SPREAD       3    /* nodes of theta at which the displacements of each are computed */
-#define WITHIN       1e-2 /* of the tolerance of the modes, for the displacements of which those of turning bodies are made */
-#define SMALL        1e-7 /* of the largest sample: smaller ones count as much as this */
-#define SCORED       24   /* displacements at all nodes of theta whose stresses show which cells matter */
-#define MANY         64   /* right-hand sides at once */
-#define SEEN         4    /* times of a path with friction whose forces are samples */
-#define SHORT        1e-7 /* of the largest response in a column: terms without larger entries are left out; */
-#define SHORTENED    0.1  /* share of MISSED that this and single precision may add */
-#define CHECKS       32   /* points at which the displacements that the modes miss are measured, no samples */
+#define WITHIN                                                                                                         \
+  1e-2                 /* of the tolerance of the modes, for the displacements of which those of turning bodies are
+                             made */
+#define SMALL     1e-7 /* of the largest sample: smaller ones count as much as this */
+#define SCORED    24   /* displacements at all nodes of theta whose stresses show which cells matter */
+#define MANY      64   /* right-hand sides at once */
+#define SEEN      4    /* times of a path with friction whose forces are samples */
+#define SHORT     1e-7 /* of the largest response in a column: terms without larger entries are left out; */
+#define SHORTENED 0.1  /* share of MISSED that this and single precision may add */
+#define CHECKS    32   /* points at which the displacements that the modes miss are measured, no samples */
 
 /* Samples: the loads' coefficients and the surfaces' forces, a column each; the last n_checks are
    checks. */
@@ -205,7 +207,7 @@ static PetscErrorCode TakePaths(HycoReducer t, HycoSnapshots store, HycoBodiesWo
     else
       PetscCall(HycoBodiesPrepare(o, s, mu));
     PetscCall(TakeForces(t, store, friction, s->pairs->n, k, L));
-    HycoBodiesGiven(o, rows, L);
+    HycoBodiesDisplacementsOfForces(o, rows, L);
     PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, o->c, b->r));
     PetscCall(PetscArraycpy(sampled->f + sampled->n * b->ns, o->f, b->ns));
     sampled->n++;
@@ -215,7 +217,8 @@ static PetscErrorCode TakePaths(HycoReducer t, HycoSnapshots store, HycoBodiesWo
 }
 
 /* Rank 0. Online code on the surfaces' mesh, which rank 0 alone has: the samples are those that a prediction would
-   find. The work is freed before an error returns. The contact problem on the surfaces alone is far cheaper than one of full order: there can be many samples. */
+   find. The work is freed before an error returns. The contact problem on the surfaces alone is far cheaper than one of
+   full order: there can be many samples. */
 static PetscErrorCode SampleForces(HycoReducer t, HycoSnapshots store, HycoFOM f, HycoSamples points, Sampled *sampled)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -244,8 +247,8 @@ static PetscErrorCode SampleForces(HycoReducer t, HycoSnapshots store, HycoFOM f
 }
 
 /* The samples on every rank, at `wanted` points or as many as there is room for: *all. Collective. */
-static PetscErrorCode Sample(HycoReducer t, HycoSnapshots store, HycoFOM f, PetscInt wanted, PetscBool *all,
-                             Sampled *sampled)
+static PetscErrorCode BodyFieldsSample(HycoReducer t, HycoSnapshots store, HycoFOM f, PetscInt wanted, PetscBool *all,
+                                       Sampled *sampled)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   const PetscInt nodes = PetscMin(SPREAD, HycoBodiesGrid(b, 0, NULL));
@@ -305,8 +308,8 @@ static PetscErrorCode DestroyVectors(PetscInt n, Vec v[])
 
 /* The displacements of this rank's part, n columns, at most MANY, for loads with coefficients c (r x n; NULL: none) and
    the z of the dense problem (p + ns, n columns; read on rank 0). Collective. */
-static PetscErrorCode Expand(HycoSubstructures b, HycoBodiesFactor *factor, PetscInt n, const PetscReal c[],
-                             const PetscReal z[], PetscReal u[])
+static PetscErrorCode BodyFieldsExpand(HycoSubstructures b, HycoBodiesFactor *factor, PetscInt n, const PetscReal c[],
+                                       const PetscReal z[], PetscReal u[])
 {
   HycoFOM f = factor->fom;
   Vec F[MANY], x[MANY];
@@ -332,12 +335,12 @@ static PetscErrorCode Expand(HycoSubstructures b, HycoBodiesFactor *factor, Pets
 
 /* Whether the displacements of sample k are computed at node j of n. With many nodes of theta each sample is
    computed at about SPREAD of them, shifted from sample to sample: every node sees some samples. */
-static PetscBool Visits(PetscInt k, PetscInt j, PetscInt n)
+static PetscBool BodyFieldsIsSampled(PetscInt k, PetscInt j, PetscInt n)
 {
   return (PetscBool)(n <= SPREAD || (j + k) % (n / SPREAD) == 0);
 }
 
-/* Expand() with the factor at theta, or what an interrupted training has kept of that. Collective. */
+/* BodyFieldsExpand() with the factor at theta, or what an interrupted training has kept of that. Collective. */
 static PetscErrorCode ExpandAt(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[], PetscInt n,
                                const PetscReal c[], const PetscReal z[], PetscReal u[])
 {
@@ -352,7 +355,7 @@ static PetscErrorCode ExpandAt(HycoReducer t, HycoBodiesFactor *factor, const Pe
   PetscCall(HycoSnapshotsFindPiece(t->store, key, 1, &array, &found));
   if (found) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoBodiesRefactor(t, factor, theta));
-  PetscCall(Expand(b, factor, n, c, z, u));
+  PetscCall(BodyFieldsExpand(b, factor, n, c, z, u));
   PetscCall(HycoSnapshotsKeepPiece(t->store, key, 1, &array));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -415,7 +418,7 @@ static PetscErrorCode ExpandNode(HycoReducer t, HycoBodiesFactor *factor, PetscI
   HycoBodiesPoint(t, j, theta);
   PetscCall(PetscMalloc1(sampled->n + 1, &sample));
   for (PetscInt k = sampled->expanded; k < last; k++) {
-    if (Visits(k, j, nodes)) sample[n++] = k;
+    if (BodyFieldsIsSampled(k, j, nodes)) sample[n++] = k;
   }
   /* Columns of earlier rounds stay: doubling the samples computes the new ones only. */
   PetscCall(PetscRealloc((n_dof * (size_t)(sampled->n_U + n + b->p) + 1) * sizeof(PetscReal), &sampled->U));
@@ -560,11 +563,11 @@ static PetscErrorCode ScaleColumns(Mat S)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The displacements of a body that turns, each of length 1, by fewer: *count singular values times modes of them, in `few`
-   (n_dof each), to a share of the tolerance of the modes. Each of them is turned in several ways, and the cost of the modes
-   grows with the square of their number. Collective. */
-static PetscErrorCode Compress(HycoReducer t, const HycoBodiesFactor *factor, PetscInt body, PetscInt n,
-                               const PetscReal U[], PetscInt *count, PetscReal **few)
+/* The displacements of a body that turns, each of length 1, by fewer: *count singular values times modes of them, in
+   `few` (n_dof each), to a share of the tolerance of the modes. Each of them is turned in several ways, and the cost of
+   the modes grows with the square of their number. Collective. */
+static PetscErrorCode BodyFieldsCompress(HycoReducer t, const HycoBodiesFactor *factor, PetscInt body, PetscInt n,
+                                         const PetscReal U[], PetscInt *count, PetscReal **few)
 {
   static const PetscReal as_it_is[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   const size_t n_dof = (size_t)factor->fom->fe->n_dof;
@@ -605,7 +608,7 @@ static PetscErrorCode ModeColumns(HycoReducer t, const HycoBodiesFactor *factor,
 
   PetscFunctionBegin;
   if (b->turn_start[body + 1] - b->turn_start[body] > 1) {
-    PetscCall(Compress(t, factor, body, n, U, &count, &few));
+    PetscCall(BodyFieldsCompress(t, factor, body, n, U, &count, &few));
     PetscCall(BodyColumns(t, factor, body, count, few, S));
     PetscCall(PetscFree(few));
   } else {
@@ -656,7 +659,7 @@ static PetscErrorCode FindModes(HycoReducer t, const HycoBodiesFactor *factor, P
 }
 
 /* norm: of the columns of S that the modes V miss. Collective. */
-static PetscErrorCode Miss(HycoReducer t, Mat V, Mat S, PetscReal norm[])
+static PetscErrorCode BodyFieldsMissedNorm(HycoReducer t, Mat V, Mat S, PetscReal norm[])
 {
   PetscBLASInt m, l, n, ld[2];
   const PetscReal one = 1, minus = -1;
@@ -689,7 +692,7 @@ static PetscErrorCode Miss(HycoReducer t, Mat V, Mat S, PetscReal norm[])
 }
 
 /* square[n]: of the displacements U (n_dof x n) of all ranks. Collective. */
-static PetscErrorCode Squares(HycoFOM f, PetscInt n, const PetscReal U[], PetscReal square[])
+static PetscErrorCode BodyFieldsSquares(HycoFOM f, PetscInt n, const PetscReal U[], PetscReal square[])
 {
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(square, n));
@@ -721,13 +724,13 @@ static PetscErrorCode MeasureLeft(HycoReducer t, HycoBodiesFactor *factor, const
   /* A point that is no sample. */
   PetscCall(ExpandSamples(t, factor, b->n_theta ? factor->between : theta, sampled, n, sample, U));
   PetscCall(PetscFree(sample));
-  PetscCall(Squares(factor->fom, n, U, all));
+  PetscCall(BodyFieldsSquares(factor->fom, n, U, all));
   for (PetscInt k = 0; k < b->n && n; k++) {
     const PetscInt turns = b->turn_start[k + 1] - b->turn_start[k];
     Mat S;
 
     PetscCall(BodyColumns(t, factor, k, n, U, &S));
-    PetscCall(Miss(t, V, S, norm));
+    PetscCall(BodyFieldsMissedNorm(t, V, S, norm));
     PetscCall(MatDestroy(&S));
     /* |sum of q_j r_j|^2 <= |q|^2 sum of |r_j|^2 (Cauchy-Schwarz). */
     for (PetscInt i = 0; i < n * turns; i++) lost[i / turns] += (turns > 1 ? b->dim : 1) * PetscSqr(norm[i]);
@@ -881,7 +884,8 @@ static PetscErrorCode BodyCoefficients(HycoReducer t, HycoBodiesFactor *factor, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* scale[rows + n] of H: of its rows, alike for the modes and for the unknowns inside; of its columns relative to these. */
+/* scale[rows + n] of H: of its rows, alike for the modes and for the unknowns inside; of its columns relative to
+   these. */
 static void ResponseScales(const HycoSubstructure *s, const Coefficient *own, PetscReal scale[])
 {
   const PetscInt rows = own->rows, columns = s->n_samples * s->n;
@@ -963,8 +967,8 @@ static PetscErrorCode RowsAt(HycoSubstructures b, PetscInt k, const Coefficient 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Raises *error to that of the rows of body k for the last samples' loads and forces, relative to the rows of each: by H as
-   it is stored, at theta. Rank 0. */
+/* Raises *error to that of the rows of body k for the last samples' loads and forces, relative to the rows of each: by
+   H as it is stored, at theta. Rank 0. */
 static PetscErrorCode StoredError(HycoSubstructures b, PetscInt k, const Coefficient *own, const Sampled *sampled,
                                   const PetscReal theta[], PetscReal *error)
 {
@@ -990,8 +994,8 @@ static PetscErrorCode StoredError(HycoSubstructures b, PetscInt k, const Coeffic
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* H of all bodies with small terms in single precision and without those that have no effect, or all of them if that adds
-   too much to what the modes miss; what it adds joins b->left. Rank 0. */
+/* H of all bodies with small terms in single precision and without those that have no effect, or all of them if that
+   adds too much to what the modes miss; what it adds joins b->left. Rank 0. */
 static PetscErrorCode StoreCoefficients(HycoReducer t, const HycoBodiesFactor *factor, const Sampled *sampled,
                                         const Coefficient own[])
 {
@@ -1113,7 +1117,7 @@ static PetscErrorCode AllCoefficients(HycoReducer t, HycoBodiesFactor *factor, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Coefficients(HycoReducer t, HycoBodiesFactor *factor, const Sampled *sampled, Mat V)
+static PetscErrorCode BodyFieldsCoefficients(HycoReducer t, HycoBodiesFactor *factor, const Sampled *sampled, Mat V)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   Coefficient *own;
@@ -1175,13 +1179,13 @@ static PetscErrorCode FindInMesh(HycoReducer t, HycoBodiesFactor *factor)
 }
 
 /* What modes may miss at a check; a tolerance of the user's that leaves out more is no reason for more samples. */
-static PetscReal Missed(HycoReducer t)
+static PetscReal BodyFieldsMissedShare(HycoReducer t)
 {
   return PetscMax(MISSED, 10 * PetscSqrtReal(HycoTrainingOfBodies(t)->pod_tol));
 }
 
-/* The modes of `wanted` samples, the number `doubled` of doublings; *enough: the samples are many more than the modes of
-   any body, which miss little at the checks, or there is no room for more. Collective. */
+/* The modes of `wanted` samples, the number `doubled` of doublings; *enough: the samples are many more than the modes
+   of any body, which miss little at the checks, or there is no room for more. Collective. */
 static PetscErrorCode ModesOf(HycoReducer t, HycoSnapshots store, HycoBodiesFactor *factor, PetscInt wanted,
                               PetscInt doubled, Sampled *sampled, Mat *V, PetscReal **sigma, PetscBool *enough)
 {
@@ -1190,7 +1194,7 @@ static PetscErrorCode ModesOf(HycoReducer t, HycoSnapshots store, HycoBodiesFact
 
   PetscFunctionBegin;
   /* Samples are solutions of the condensed bodies: each costs a dense contact problem and no factor. */
-  PetscCall(Sample(t, store, factor->fom, wanted, &all, sampled));
+  PetscCall(BodyFieldsSample(t, store, factor->fom, wanted, &all, sampled));
   PetscCall(ExpandAll(t, factor, sampled));
   if (!HycoBodiesFlow(t)) PetscCall(HycoBodiesChooseCells(t, factor)); /* else those with laws are chosen */
   PetscCall(PetscFree(b->mode_start));
@@ -1204,7 +1208,7 @@ static PetscErrorCode ModesOf(HycoReducer t, HycoSnapshots store, HycoBodiesFact
     *enough = (PetscBool)(*enough && b->mode_start[k + 1] - b->mode_start[k] <= FULL * sampled->expanded);
   HycoTrainingOfBodies(t)->filled = (PetscBool) !*enough;
   /* What modes miss at the checks is doubled for at most a few times: geometry parameters may never be spanned. */
-  if (sampled->n_checks && doubled < UNTIL_SEEN) *enough = (PetscBool)(*enough && b->left <= Missed(t));
+  if (sampled->n_checks && doubled < UNTIL_SEEN) *enough = (PetscBool)(*enough && b->left <= BodyFieldsMissedShare(t));
   *enough = (PetscBool)(*enough || !all);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -1240,7 +1244,7 @@ PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFa
   }
   PetscCall(PetscFree(sampled.U));
   /* Rows of H and a for the modes that were kept: only once, after the last doubling. */
-  if (!ierr) ierr = Coefficients(t, factor, &sampled, V);
+  if (!ierr) ierr = BodyFieldsCoefficients(t, factor, &sampled, V);
   HycoFreeAll(&sampled.c, &sampled.f);
   if (ierr) {
     PetscCall(MatDestroy(&V));

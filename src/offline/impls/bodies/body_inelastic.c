@@ -1,8 +1,8 @@
 /*
   Training of bodies that deform inelastically. Elastic responses to loads and contact forces are exact, so that modes
   are needed for what the stresses lack of the elastic ones alone, s = sum of alpha_k s_k: the displacements K^-1 q_k of
-  their nodal forces on the surfaces (P), in the cells of the points at which the laws are evaluated (A), and in the modes
-  of fields. In these cells displacements are exact too: rows of K^-1 for surface forces (C) and loads (R).
+  their nodal forces on the surfaces (P), in the cells of the points at which the laws are evaluated (A), and in the
+  modes of fields. In these cells displacements are exact too: rows of K^-1 for surface forces (C) and loads (R).
 */
 #include <hycoalgorithms.h>
 #include <hycobodiestraining.h>
@@ -126,7 +126,7 @@ static PetscErrorCode TakeThere(HycoReducer t, PetscReal inverse[], PetscReal *s
 }
 
 /* Interpolation: the modes' Q-DEIM points; T is the pseudo-inverse of the modes there. Collective. */
-static PetscErrorCode Interpolate(HycoReducer t)
+static PetscErrorCode BodyInelasticInterpolate(HycoReducer t)
 {
   HycoBodiesTraining s = HycoTrainingOfBodies(t);
   HycoBodiesInelastic in = s->bodies->inelastic;
@@ -230,7 +230,7 @@ static PetscErrorCode TakeValues(const Unknowns *at, Vec x, PetscInt k, PetscInt
 
 /* x = K^-1 F; the surfaces' displacements u. Collective. F: inelastic forces of one mode. The rigid motions' work is
    not needed: such forces are self-equilibrated. */
-static PetscErrorCode Displace(HycoSubstructures b, HycoBodiesFactor *factor, Vec F, PetscReal u[], Vec *x)
+static PetscErrorCode BodyInelasticDisplace(HycoSubstructures b, HycoBodiesFactor *factor, Vec F, PetscReal u[], Vec *x)
 {
   PetscReal *work;
 
@@ -270,7 +270,7 @@ static PetscErrorCode ForceOfMode(HycoReducer t, HycoFOM f, PetscInt k, Vec F)
 
 /* The responses to the modes: P and the fields; work[m x m]: of the modes on these, Q^T K^-1 Q. Collective. One solve
    for each mode; every later path combines these. */
-static PetscErrorCode Respond(HycoReducer t, HycoBodiesFactor *factor, PetscReal u[], PetscReal work[])
+static PetscErrorCode BodyInelasticRespond(HycoReducer t, HycoBodiesFactor *factor, PetscReal u[], PetscReal work[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   HycoBodiesInelastic in = b->inelastic;
@@ -282,7 +282,7 @@ static PetscErrorCode Respond(HycoReducer t, HycoBodiesFactor *factor, PetscReal
   PetscCall(VecDuplicate(factor->fom->F, &F));
   for (PetscInt k = 0; k < in->m; k++) {
     PetscCall(ForceOfMode(t, factor->fom, k, F));
-    PetscCall(Displace(b, factor, F, u, &factor->strain[k]));
+    PetscCall(BodyInelasticDisplace(b, factor, F, u, &factor->strain[k]));
     factor->n_strains++;
     for (PetscInt i = 0; i < b->ns; i++) in->P[(size_t)i * (size_t)in->m + (size_t)k] = u[i];
     /* Q^T K^-1 Q is symmetric: half of the products. */
@@ -343,7 +343,7 @@ static PetscErrorCode FillLoads(HycoReducer t, HycoBodiesFactor *factor, const U
     Vec x;
 
     /* Full displacements, of which the cells' unknowns are taken: loads are few. */
-    PetscCall(Displace(b, factor, factor->basis[k], u, &x));
+    PetscCall(BodyInelasticDisplace(b, factor, factor->basis[k], u, &x));
     PetscCall(TakeValues(at, x, k, b->r, b->inelastic->R));
     PetscCall(VecDestroy(&x));
   }
@@ -353,7 +353,7 @@ static PetscErrorCode FillLoads(HycoReducer t, HycoBodiesFactor *factor, const U
 /* -- laws at few points -- */
 
 /* Whether a law yields, on any rank. Laws may fail on one rank alone. Collective. */
-static PetscErrorCode Yields(HycoReducer t, PetscBool *yields)
+static PetscErrorCode BodyInelasticIsYielding(HycoReducer t, PetscBool *yields)
 {
   PetscFunctionBegin;
   HycoOnEach(HycoComm(t), HycoFEYields(t->fom->fe, t->scene->times[0], yields));
@@ -363,7 +363,7 @@ static PetscErrorCode Yields(HycoReducer t, PetscBool *yields)
 
 /* Columns of X become X M, with M m x l column major; x: their number, then l. Collective. MAXPY into new vectors,
    since X is needed until the last column. */
-static PetscErrorCode Combine(PetscInt m, PetscInt l, const PetscReal M[], Vec X[])
+static PetscErrorCode BodyInelasticCombine(PetscInt m, PetscInt l, const PetscReal M[], Vec X[])
 {
   Vec *Y;
 
@@ -382,7 +382,7 @@ static PetscErrorCode Combine(PetscInt m, PetscInt l, const PetscReal M[], Vec X
 /* Takes the modes' displacements that have energy, orthonormal in it: the inelastic forces of the paths are sums of
    sigma_k q_k, so that the eigenvectors of their displacements' Gram matrix are those of a POD of the displacements.
    work[m x m]: Q^T K^-1 Q. The modes of the forces stay. Collective. */
-static PetscErrorCode Orthogonalise(HycoReducer t, HycoBodiesFactor *factor, const PetscReal work[])
+static PetscErrorCode BodyInelasticOrthogonalise(HycoReducer t, HycoBodiesFactor *factor, const PetscReal work[])
 {
   HycoBodiesTraining s = HycoTrainingOfBodies(t);
   HycoSubstructures b = s->bodies;
@@ -398,7 +398,7 @@ static PetscErrorCode Orthogonalise(HycoReducer t, HycoBodiesFactor *factor, con
   /* By the Gram matrix: m is some tens, and vectors of the mesh's length are not factored again. */
   PetscCall(HycoPODGram(m, gram, s->inelastic_tol, 0, &M, &l, sigma));
   for (PetscInt i = 0; i < m * l; i++) M[i] *= scale[i % m];
-  PetscCall(Combine(m, l, M, factor->strain));
+  PetscCall(BodyInelasticCombine(m, l, M, factor->strain));
   PetscCall(PetscCalloc1((size_t)b->ns * (size_t)l + 1, &P));
   for (PetscInt i = 0; i < b->ns; i++) {
     for (PetscInt d = 0; d < l * m; d++) P[i * l + d / m] += in->P[i * m + d % m] * M[d];
@@ -434,10 +434,10 @@ static PetscErrorCode WorkOnModes(HycoFE fe, const PetscReal value[], PetscInt m
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The work of the largest n_k modes of the stresses on the modes' displacements in each cell, a column for each pair, by
-   the stresses' sizes: rows in the file's order. Collective. J of the empirical cubature: the sum over all cells
+/* The work of the largest n_k modes of the stresses on the modes' displacements in each cell, a column for each pair,
+   by the stresses' sizes: rows in the file's order. Collective. J of the empirical cubature: the sum over all cells
    is what the weights must reproduce. sigma_k scales each stress mode to its share in the training paths. */
-static PetscErrorCode Contributions(HycoReducer t, HycoBodiesFactor *factor, PetscInt n_k, Mat *S)
+static PetscErrorCode BodyInelasticContributions(HycoReducer t, HycoBodiesFactor *factor, PetscInt n_k, Mat *S)
 {
   const HycoBasis *modes = &HycoTrainingOfBodies(t)->strains;
   HycoFE fe = t->fom->fe;
@@ -473,8 +473,9 @@ static PetscErrorCode Contributions(HycoReducer t, HycoBodiesFactor *factor, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All points of the cells with weights w (rank 0) as those of the model; weight[] ordered as they are. Single points would
-   do for the training paths, but where an unseen plastic front decides, whole cells are much more accurate. Collective. */
+/* All points of the cells with weights w (rank 0) as those of the model; weight[] ordered as they are. Single points
+   would do for the training paths, but where an unseen plastic front decides, whole cells are much more accurate.
+   Collective. */
 static PetscErrorCode TakeWeighted(HycoReducer t, const PetscReal w[], PetscReal **weight)
 {
   const PetscInt nq = HycoElementGet(t->fom->part->type)->nq;
@@ -499,7 +500,7 @@ static PetscErrorCode TakeWeighted(HycoReducer t, const PetscReal w[], PetscReal
 
 /* Galerkin's method on the modes' displacements A, orthonormal in energy, with a cubature: alpha = sum over points of
    weight w (B A)^T s. Collective. */
-static PetscErrorCode Cubature(HycoReducer t, HycoBodiesFactor *factor, PetscReal **weight)
+static PetscErrorCode BodyInelasticCubature(HycoReducer t, HycoBodiesFactor *factor, PetscReal **weight)
 {
   HycoBodiesTraining s = HycoTrainingOfBodies(t);
   HycoBodiesInelastic in = s->bodies->inelastic;
@@ -511,7 +512,7 @@ static PetscErrorCode Cubature(HycoReducer t, HycoBodiesFactor *factor, PetscRea
   PetscFunctionBegin;
   /* Modes below the tolerance of the cubature would only add columns. */
   while (n_k < s->strains.l && s->strains.sigma[n_k] > s->cubature_tol * s->strains.sigma[0]) n_k++;
-  PetscCall(Contributions(t, factor, n_k, &S));
+  PetscCall(BodyInelasticContributions(t, factor, n_k, &S));
   PetscCall(PetscCalloc1(in->m * n_k + 1, &sigma));
   PetscCall(HycoReducerPOD(t, S, s->cubature_tol * s->cubature_tol, 0, &W, &n, sigma));
   PetscCall(MatDestroy(&S));
@@ -577,7 +578,8 @@ static PetscErrorCode FillOwnPoints(HycoReducer t, const Unknowns *at, const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Weights and T of the points; T and the modes there are of s. weight: of the cubature, NULL: interpolation. Collective. */
+/* Weights and T of the points; T and the modes there are of s. weight: of the cubature, NULL: interpolation.
+   Collective. */
 static PetscErrorCode FillPoints(HycoReducer t, const Unknowns *at, const PetscReal weight[])
 {
   HycoBodiesInelastic in = HycoTrainingOfBodies(t)->bodies->inelastic;
@@ -632,14 +634,14 @@ static PetscErrorCode ChoosePoints(HycoReducer t, HycoBodiesFactor *factor, cons
 
   PetscFunctionBegin;
   *weight = NULL;
-  if (s->laws == HYCO_BODIES_AUTO && in->m) PetscCall(Yields(t, &yields));
+  if (s->laws == HYCO_BODIES_AUTO && in->m) PetscCall(BodyInelasticIsYielding(t, &yields));
   /* Creep is smooth in space, so that few points interpolate it; plastic fronts need Galerkin's method. */
   if (!yields || !in->m) {
-    PetscCall(Interpolate(t));
+    PetscCall(BodyInelasticInterpolate(t));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(Orthogonalise(t, factor, work));
-  PetscCall(Cubature(t, factor, weight));
+  PetscCall(BodyInelasticOrthogonalise(t, factor, work));
+  PetscCall(BodyInelasticCubature(t, factor, weight));
   in->amplification = 1;
   in->weighted = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -660,7 +662,7 @@ PetscErrorCode HycoBodiesStrains(HycoReducer t, HycoBodiesFactor *factor)
   PetscCall(HycoBodiesRefactor(t, factor, theta));
   PetscCall(PetscCalloc1((size_t)b->ns * (size_t)in->m + 1, &in->P));
   PetscCall(PetscMalloc2(b->ns + 1, &u, in->m * in->m + 1, &work));
-  PetscCall(Respond(t, factor, u, work));
+  PetscCall(BodyInelasticRespond(t, factor, u, work));
   PetscCall(ChoosePoints(t, factor, work, &weight));
   /* After the points are chosen: only their cells need displacements. */
   PetscCall(FillCells(t, factor, weight, u));

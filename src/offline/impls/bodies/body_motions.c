@@ -1,9 +1,9 @@
 /*
   The rigid motions of bodies that contact alone holds and whose shape changes. Their isostatic supports, the pins, stay
   those of the first sample; the motion that moves one pin by 1 and no other depends on the places of the nodes, and so
-  does the work of the loads on it. Predictions make both from the nodes' places at mu, so that the forces of the contacts
-  balance the loads there: a table over theta has the coefficients of the motions and the moments of the loads, which need
-  no factor and therefore as many values as reproduce them to round-off.
+  does the work of the loads on it. Predictions make both from the nodes' places at mu, so that the forces of the
+  contacts balance the loads there: a table over theta has the coefficients of the motions and the moments of the loads,
+  which need no factor and therefore as many values as reproduce them to round-off.
 */
 #include <hycobodiestraining.h>
 #include <petscblaslapack.h>
@@ -16,7 +16,7 @@
 #define FAR         1e4   /* largest coefficient of a motion that moves a pin by 1, beside a body's size */
 
 /* Whether body k has a part in the table. */
-static PetscBool Varies(HycoSubstructures b, const HycoBodiesFactor *factor, PetscInt k)
+static PetscBool BodyMotionsVaries(HycoSubstructures b, const HycoBodiesFactor *factor, PetscInt k)
 {
   PetscBool axis = PETSC_FALSE;
 
@@ -25,7 +25,7 @@ static PetscBool Varies(HycoSubstructures b, const HycoBodiesFactor *factor, Pet
 }
 
 /* C (p x p row major): the combinations of the motions that move each one pin by 1. Collective. */
-static PetscErrorCode Combine(HycoBodiesFactor *factor, const HycoMotions *motions, PetscReal C[])
+static PetscErrorCode BodyMotionsCombine(HycoBodiesFactor *factor, const HycoMotions *motions, PetscReal C[])
 {
   HycoFE fe = factor->fom->fe;
   HycoMesh m = factor->fom->part;
@@ -125,7 +125,7 @@ static PetscErrorCode TakeMoments(HycoSubstructures b, HycoBodiesFactor *factor,
 }
 
 /* The numbers of the table at the variables x. Collective. */
-static PetscErrorCode Evaluate(HycoReducer t, HycoBodiesFactor *factor, const PetscReal x[], PetscReal row[])
+static PetscErrorCode BodyMotionsEvaluate(HycoReducer t, HycoBodiesFactor *factor, const PetscReal x[], PetscReal row[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   PetscReal theta[HYCO_MAX_PARAMETERS], *C;
@@ -139,7 +139,7 @@ static PetscErrorCode Evaluate(HycoReducer t, HycoBodiesFactor *factor, const Pe
   PetscCall(HycoFEFreeMotions(HycoComm(t), factor->fom->fe, &motions));
   PetscCall(PetscMalloc1(b->p * b->p, &C));
   /* Of other numbers training has no factor: HycoBodiesCondense() refuses them. */
-  if (motions.n == b->p) ierr = Combine(factor, &motions, C);
+  if (motions.n == b->p) ierr = BodyMotionsCombine(factor, &motions, C);
   if (motions.n == b->p && !ierr) ierr = TakeCoefficients(b, &motions, C, row);
   if (!ierr) ierr = TakeMoments(b, factor, row + 6 * b->p);
   PetscCall(PetscFree(C));
@@ -206,14 +206,14 @@ static PetscErrorCode FillTable(HycoReducer t, HycoBodiesFactor *factor)
 
     for (PetscInt p = b->n_theta - 1, rest = j; p >= 0; rest /= m->n_nodes[p--])
       x[p] = m->table.tensor.x[p][rest % m->n_nodes[p]];
-    PetscCall(Evaluate(t, factor, x, m->table.data + (size_t)j * (size_t)m->table.rows));
+    PetscCall(BodyMotionsEvaluate(t, factor, x, m->table.data + (size_t)j * (size_t)m->table.rows));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The largest difference of the table from the numbers at points where theta p changes, relative to the largest of each
    motion or load. Collective. */
-static PetscErrorCode ErrorAlong(HycoReducer t, HycoBodiesFactor *factor, PetscInt p, PetscReal *error)
+static PetscErrorCode DirectionError(HycoReducer t, HycoBodiesFactor *factor, PetscInt p, PetscReal *error)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   const HycoBodiesMotions *m = &b->motions;
@@ -233,7 +233,7 @@ static PetscErrorCode ErrorAlong(HycoReducer t, HycoBodiesFactor *factor, PetscI
       x[q] = lo + (q == p ? 0.5 * (PetscReal)side : 0.2718) * (hi - lo);
       if (q == p && side == 1) x[q] = lo + 0.4142 * (hi - lo);
     }
-    PetscCall(Evaluate(t, factor, x, here));
+    PetscCall(BodyMotionsEvaluate(t, factor, x, here));
     PetscCall(HycoGridFieldEvaluate(&m->table, x, there));
     for (PetscInt i = 0; i < m->table.rows; i += 6) {
       PetscReal largest = 0, off = 0;
@@ -265,7 +265,7 @@ static PetscErrorCode RefineTable(HycoReducer t, HycoBodiesFactor *factor)
     for (PetscInt p = 0; p < b->n_theta; p++) {
       const PetscInt n = b->motions.n_nodes[p];
 
-      PetscCall(ErrorAlong(t, factor, p, &e[p]));
+      PetscCall(DirectionError(t, factor, p, &e[p]));
       most = PetscMax(most, e[p]);
       if (e[p] <= EXACT || n >= MOST_VALUES || all / n * (2 * n - 1) > MOST_POINTS) continue;
       if (worst < 0 || e[p] > e[worst]) worst = p;
@@ -293,7 +293,7 @@ PetscErrorCode HycoBodiesTakeMotions(HycoReducer t, HycoBodiesFactor *factor)
   PetscBool any = PETSC_FALSE;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < b->n; k++) any = (PetscBool)(any || Varies(b, factor, k));
+  for (PetscInt k = 0; k < b->n; k++) any = (PetscBool)(any || BodyMotionsVaries(b, factor, k));
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   m->table.rows = 6 * (b->p + b->n * b->r);
   PetscCall(PetscMalloc1(b->p, &m->body));
@@ -305,7 +305,7 @@ PetscErrorCode HycoBodiesTakeMotions(HycoReducer t, HycoBodiesFactor *factor)
     theta[p] = b->first[b->theta[p]];
     m->n_nodes[p] = 1;
     for (PetscInt k = 0; k < b->n; k++) {
-      if (Varies(b, factor, k) && HycoBodiesAxis(b, k, p)) m->n_nodes[p] = 3;
+      if (BodyMotionsVaries(b, factor, k) && HycoBodiesAxis(b, k, p)) m->n_nodes[p] = 3;
     }
   }
   PetscCall(HycoBodiesMoveTo(t, factor, theta));

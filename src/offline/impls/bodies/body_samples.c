@@ -1,9 +1,9 @@
 /*
-  The samples of theta, the parameters that change the shape of bodies or the ratio of their moduli: a tensor grid of the
-  extrema of Chebyshev polynomials, whose finer grids contain the coarser ones. If -e C <= C~ - C <= e C for every body,
-  the same holds for W, and the two variational inequalities give |L~ - L|_W <= e |L~|_W, whatever touches. e is measured
-  where the next finer grid has its nodes, so that these are not lost if that is needed; between these points it is an
-  estimate.
+  The samples of theta, the parameters that change the shape of bodies or the ratio of their moduli: a tensor grid of
+  the extrema of Chebyshev polynomials, whose finer grids contain the coarser ones. If -e C <= C~ - C <= e C for every
+  body, the same holds for W, and the two variational inequalities give |L~ - L|_W <= e |L~|_W, whatever touches. e is
+  measured where the next finer grid has its nodes, so that these are not lost if that is needed; between these points
+  it is an estimate.
 */
 #include <hycobodiestraining.h>
 #include <petscblaslapack.h>
@@ -19,7 +19,7 @@
 
 /* Node k of n along parameter p, in its own variable. Chebyshev points of the second kind (extrema), nested when their
    number n goes to 2 n - 1: former samples stay. Ends exactly, without round-off. */
-static PetscReal Node(HycoReducer t, HycoSubstructures b, PetscInt p, PetscInt n, PetscInt k)
+static PetscReal BodySamplesNode(HycoReducer t, HycoSubstructures b, PetscInt p, PetscInt n, PetscInt k)
 {
   const PetscReal share = (1 - PetscCosReal(PETSC_PI * ((PetscReal)k / (PetscReal)(n - 1)))) / 2;
   const PetscInt variable = b->variable[p];
@@ -65,7 +65,7 @@ static PetscErrorCode SetGrid(HycoReducer t, HycoSubstructures b)
   n = 0;
   for (PetscInt p = 0; p < b->n_theta; p++) {
     for (PetscInt k = 0; k < b->n_nodes[p]; k++)
-      b->node[n++] = HycoBodiesVariable(b->variable[p], Node(t, b, p, b->n_nodes[p], k));
+      b->node[n++] = HycoBodiesVariable(b->variable[p], BodySamplesNode(t, b, p, b->n_nodes[p], k));
   }
   /* Each body has the nodes of the axes that change it and one of the others. */
   for (PetscInt k = 0; k < b->n; k++) {
@@ -81,7 +81,7 @@ void HycoBodiesPoint(HycoReducer t, PetscInt k, PetscReal theta[])
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
 
   for (PetscInt p = b->n_theta - 1; p >= 0; p--) {
-    theta[p] = Node(t, b, p, b->n_nodes[p], k % b->n_nodes[p]);
+    theta[p] = BodySamplesNode(t, b, p, b->n_nodes[p], k % b->n_nodes[p]);
     k /= b->n_nodes[p];
   }
 }
@@ -141,7 +141,7 @@ static PetscErrorCode TakeRecords(HycoReducer t, HycoBodiesFactor *factor, const
 /* -- the bound -- */
 
 /* record->L, the Cholesky factor of C in its lower triangle; made once, as the point is held out again. */
-static PetscErrorCode Factor(PetscInt n, HycoBodyRecord *record)
+static PetscErrorCode BodySamplesFactor(PetscInt n, HycoBodyRecord *record)
 {
   PetscBLASInt m, info;
   PetscReal most = 0, *L;
@@ -162,7 +162,7 @@ static PetscErrorCode Factor(PetscInt n, HycoBodyRecord *record)
 
 /* The largest |eigenvalue| of (D, C), D symmetric, from the factor L of C (both n x n). Power iteration on L^-1 D L^-T,
    symmetric, whose |eigenvalues| are those of the pencil; a few digits are enough for a bound. */
-static PetscErrorCode Largest(PetscInt n, const PetscReal L[], const PetscReal D[], PetscReal *largest)
+static PetscErrorCode BodySamplesLargest(PetscInt n, const PetscReal L[], const PetscReal D[], PetscReal *largest)
 {
   PetscBLASInt m, one = 1;
   const PetscReal unit = 1, zero = 0;
@@ -219,8 +219,9 @@ static PetscErrorCode AddGram(const HycoSubstructure *s, const PetscReal weight[
 }
 
 /* D = the flexibility of a body at the weights of its samples, from these or as it is stored, minus C. */
-static PetscErrorCode Difference(const HycoSubstructure *s, const HycoBodyFactor *body, const PetscReal weight[],
-                                 PetscBool stored, const PetscReal C[], PetscReal D[])
+static PetscErrorCode BodySamplesDifference(const HycoSubstructure *s, const HycoBodyFactor *body,
+                                            const PetscReal weight[], PetscBool stored, const PetscReal C[],
+                                            PetscReal D[])
 {
   const size_t n = (size_t)s->n;
   PetscReal *share;
@@ -246,10 +247,10 @@ typedef struct {
   PetscInt *record;
 } Held;
 
-/* e of all bodies at a point: of the samples, whose errors of R join gram, or of the flexibilities as they are stored. Rank
-   0. */
-static PetscErrorCode Bound(HycoSubstructures b, const HycoBodiesFactor *factor, const Held *held, PetscBool stored,
-                            PetscReal *e)
+/* e of all bodies at a point: of the samples, whose errors of R join gram, or of the flexibilities as they are stored.
+   Rank 0. */
+static PetscErrorCode BodySamplesBound(HycoSubstructures b, const HycoBodiesFactor *factor, const Held *held,
+                                       PetscBool stored, PetscReal *e)
 {
   PetscFunctionBegin;
   *e = 0;
@@ -263,9 +264,9 @@ static PetscErrorCode Bound(HycoSubstructures b, const HycoBodiesFactor *factor,
     if (s->n_samples == 1 || !s->n) continue;
     PetscCall(PetscMalloc2(n + 1, &D, s->n_samples, &weight));
     PetscCall(HycoBodiesWeights(b, k, held->mu, weight));
-    PetscCall(Factor(s->n, record));
-    PetscCall(Difference(s, &factor->body[k], weight, stored, record->C, D));
-    PetscCall(Largest(s->n, record->L, D, &own));
+    PetscCall(BodySamplesFactor(s->n, record));
+    PetscCall(BodySamplesDifference(s, &factor->body[k], weight, stored, record->C, D));
+    PetscCall(BodySamplesLargest(s->n, record->L, D, &own));
     *e = PetscMax(*e, own);
     if (!stored) PetscCall(AddGram(s, weight, b->r, record->L, record->R));
     PetscCall(PetscFree2(D, weight));
@@ -274,7 +275,7 @@ static PetscErrorCode Bound(HycoSubstructures b, const HycoBodiesFactor *factor,
 }
 
 /* e along axis p: at two nodes of the next finer grid, with the other parameters at a middle node. Collective. */
-static PetscErrorCode BoundAlong(HycoReducer t, HycoBodiesFactor *factor, PetscInt axis, Held held[2], PetscReal *e)
+static PetscErrorCode BoundDirection(HycoReducer t, HycoBodiesFactor *factor, PetscInt axis, Held held[2], PetscReal *e)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
 
@@ -285,12 +286,12 @@ static PetscErrorCode BoundAlong(HycoReducer t, HycoBodiesFactor *factor, PetscI
     PetscReal theta[HYCO_MAX_PARAMETERS], own = 0;
 
     for (PetscInt p = 0; p < b->n_theta; p++) {
-      theta[p] =
-          p == axis ? Node(t, b, p, finer, side ? finer - 2 : 1) : Node(t, b, p, b->n_nodes[p], b->n_nodes[p] / 2);
+      theta[p] = p == axis ? BodySamplesNode(t, b, p, finer, side ? finer - 2 : 1)
+                           : BodySamplesNode(t, b, p, b->n_nodes[p], b->n_nodes[p] / 2);
       held[side].mu[b->theta[p]] = theta[p];
     }
     PetscCall(HycoBodiesCondense(t, factor, theta, held[side].record));
-    HycoOnRoot(HycoComm(t), Bound(b, factor, &held[side], PETSC_FALSE, &own));
+    HycoOnRoot(HycoComm(t), BodySamplesBound(b, factor, &held[side], PETSC_FALSE, &own));
     PetscCallMPI(MPI_Bcast(&own, 1, MPIU_REAL, 0, HycoComm(t)));
     *e = PetscMax(*e, own);
     PetscCall(PetscFree(factor->between));
@@ -322,7 +323,8 @@ static PetscErrorCode CondenseGrid(HycoReducer t, HycoBodiesFactor *factor)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How many samples there may be: without a limit of the user's more than most_samples where they are cheap. Collective. */
+/* How many samples there may be: without a limit of the user's more than most_samples where they are cheap.
+   Collective. */
 static PetscErrorCode FindRoom(HycoReducer t)
 {
   const HycoBodiesTraining s = HycoTrainingOfBodies(t);
@@ -344,7 +346,7 @@ static PetscErrorCode FindRoom(HycoReducer t)
 }
 
 /* The axis with the largest e that a finer grid may reduce, -1: none; then s->ended says what does not let it. */
-static PetscInt Worst(HycoReducer t, HycoSubstructures b, const PetscReal e[])
+static PetscInt BodySamplesWorst(HycoReducer t, HycoSubstructures b, const PetscReal e[])
 {
   const HycoBodiesTraining s = HycoTrainingOfBodies(t);
   PetscReal most = 0;
@@ -371,16 +373,16 @@ static PetscInt Worst(HycoReducer t, HycoSubstructures b, const PetscReal e[])
   return worst;
 }
 
-/* Ways to store a flexibility, the shortest first: shares of the tolerance below which terms are left out, and the size up
-   to which they are in single precision; the last one is all of it. The noise of single precision acts on the stiffest
-   parts of C, a term that is left out hardly does. */
+/* Ways to store a flexibility, the shortest first: shares of the tolerance below which terms are left out, and the size
+   up to which they are in single precision; the last one is all of it. The noise of single precision acts on the
+   stiffest parts of C, a term that is left out hardly does. */
 static const struct {
   PetscReal least, single;
 } ways[] = {{1e-2, PETSC_MAX_REAL}, {1e-2, 1e-2}, {1e-3, 1e-4}, {0, 0}};
 
 /* The flexibilities in the first of these ways that adds to e of no axis more than it may; e becomes that of what is
    stored. Rank 0. */
-static PetscErrorCode Store(HycoReducer t, const HycoBodiesFactor *factor, const Held held[], PetscReal e[])
+static PetscErrorCode BodySamplesStore(HycoReducer t, const HycoBodiesFactor *factor, const Held held[], PetscReal e[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   const PetscReal tol = HycoTrainingOfBodies(t)->tol;
@@ -395,7 +397,7 @@ static PetscErrorCode Store(HycoReducer t, const HycoBodiesFactor *factor, const
     for (PetscInt p = 0; p < b->n_theta && ways[way].least > 0; p++) {
       stored[p] = 0;
       for (PetscInt side = 0; side < 2 && fine; side++) {
-        PetscCall(Bound(b, factor, &held[2 * p + side], PETSC_TRUE, &own));
+        PetscCall(BodySamplesBound(b, factor, &held[2 * p + side], PETSC_TRUE, &own));
         stored[p] = PetscMax(stored[p], own);
         fine = (PetscBool)(own <= e[p] + SHORTENED * tol / b->n_theta);
       }
@@ -407,7 +409,7 @@ static PetscErrorCode Store(HycoReducer t, const HycoBodiesFactor *factor, const
 
 /* One axis is refined at a time, the worst: a tensor grid that is fine in all of them would cost the product. What
    remains above the tolerance is no failure, it is in the bound. */
-static PetscErrorCode Refine(HycoReducer t, HycoBodiesFactor *factor, Held held[])
+static PetscErrorCode BodySamplesRefine(HycoReducer t, HycoBodiesFactor *factor, Held held[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   PetscReal e[HYCO_MAX_PARAMETERS] = {0};
@@ -418,12 +420,12 @@ static PetscErrorCode Refine(HycoReducer t, HycoBodiesFactor *factor, Held held[
   do {
     HycoTrainingOfBodies(t)->ended[0] = '\0';
     PetscCall(CondenseGrid(t, factor));
-    for (PetscInt p = 0; p < b->n_theta; p++) PetscCall(BoundAlong(t, factor, p, held + 2 * p, &e[p]));
-    worst = Worst(t, b, e);
+    for (PetscInt p = 0; p < b->n_theta; p++) PetscCall(BoundDirection(t, factor, p, held + 2 * p, &e[p]));
+    worst = BodySamplesWorst(t, b, e);
     /* Nested Chebyshev grids: all former samples stay nodes of the finer grid. */
     if (worst >= 0) b->n_nodes[worst] = 2 * b->n_nodes[worst] - 1;
   } while (worst >= 0);
-  HycoOnRoot(HycoComm(t), Store(t, factor, held, e));
+  HycoOnRoot(HycoComm(t), BodySamplesStore(t, factor, held, e));
   HycoBcast(e, b->n_theta, MPIU_REAL, HycoComm(t));
   b->bound = 0;
   for (PetscInt p = 0; p < b->n_theta; p++) {
@@ -447,6 +449,6 @@ PetscErrorCode HycoBodiesSample(HycoReducer t, HycoBodiesFactor *factor)
   PetscFunctionBegin;
   PetscCall(PetscCalloc2(n + 1, &held, n * factor->n + 1, &record));
   for (PetscInt k = 0; k < n; k++) held[k].record = record + k * factor->n;
-  HycoFinally(Refine(t, factor, held), PetscCall(PetscFree2(held, record)));
+  HycoFinally(BodySamplesRefine(t, factor, held), PetscCall(PetscFree2(held, record)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -208,7 +208,8 @@ static PetscErrorCode LeaveOut(HycoFOM f, PetscBool in[])
 }
 
 /* Lists the free unknowns of the surfaces by body, with their numbers in the distributed vectors. Rank 0. */
-static PetscErrorCode List(HycoFOM f, const PetscInt of[], const PetscBool in[], HycoSubstructures b, PetscInt global[])
+static PetscErrorCode CondenseBodiesList(HycoFOM f, const PetscInt of[], const PetscBool in[], HycoSubstructures b,
+                                         PetscInt global[])
 {
   HycoMesh m = f->surface;
 
@@ -239,12 +240,12 @@ static PetscErrorCode ListReached(HycoFOM f, const PetscInt of[], PetscInt many,
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(f->surface->n_nodes + 1, &in));
   PetscCall(HycoPairsMarkSurfaces(f->scene, f->surface, &f->pairs, in));
-  PetscCall(List(f, of, in, b, global));
+  PetscCall(CondenseBodiesList(f, of, in, b, global));
   for (PetscInt k = 0; k < b->n; k++) most = PetscMax(most, b->start[k + 1] - b->start[k]);
   /* A body's flexibility is dense: nodes that no slave ever meets are left out where that pays. */
   if (most > many && f->searches && f->scene->n_parameters) {
     PetscCall(LeaveOut(f, in));
-    PetscCall(List(f, of, in, b, global));
+    PetscCall(CondenseBodiesList(f, of, in, b, global));
   }
   PetscCall(PetscFree(in));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -289,7 +290,7 @@ PetscErrorCode HycoBodyPartsRefuse(HycoFOM f, const HycoBodyParts *parts, char w
 }
 
 /* The unknowns on every rank, and N, whose rows select them. Collective. */
-static PetscErrorCode Select(HycoReducer t, HycoSubstructures b, Mat *N)
+static PetscErrorCode CondenseBodiesSelect(HycoReducer t, HycoSubstructures b, Mat *N)
 {
   HycoFOM f = t->fom;
   const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
@@ -334,7 +335,7 @@ static PetscErrorCode NodesAt(HycoReducer t, const PetscReal first[], PetscInt p
 
 /* distance[]: by variable, how far the nodes of the bodies whose shape parameter p changes are from straight lines over
    its range, squared. Collective. */
-static PetscErrorCode Bends(HycoReducer t, const PetscReal mu[], PetscInt p, PetscReal distance[])
+static PetscErrorCode CondenseBodiesCurvature(HycoReducer t, const PetscReal mu[], PetscInt p, PetscReal distance[])
 {
   const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
   const PetscReal lo = t->scene->lo[p], hi = t->scene->hi[p];
@@ -389,7 +390,7 @@ static PetscErrorCode ChooseVariable(HycoReducer t, const PetscReal mu[], PetscI
     if (s->hi[p] > 2 * s->lo[p]) *variable = HYCO_BODIES_LOGARITHM;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(Bends(t, mu, p, distance));
+  PetscCall(CondenseBodiesCurvature(t, mu, p, distance));
   for (PetscInt g = 0; g < HYCO_BODIES_VARIABLES; g++) {
     /* Clearly straighter only: a tie stays with the parameter itself. */
     if (distance[g] < STRAIGHTER * distance[*variable]) *variable = g;
@@ -446,7 +447,7 @@ static PetscErrorCode TakeNoStrains(HycoReducer t)
 
 /* Each step needs those before: the surfaces, the factors' blocks, the loads' basis (R), samples, inelastic
    responses, modes. factor->fom has its own K: t->fom's fe serves the points meanwhile. */
-static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFactor *factor)
+static PetscErrorCode CondenseAllBodies(HycoReducer t, HycoSnapshots store, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   Mat N;
@@ -458,7 +459,7 @@ static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFac
              PETSC_COMM_SELF, PETSC_ERR_PLIB, "two meshes of one scene differ");
   /* Supports of the surfaces' mesh are known at parameters only. */
   PetscCall(HycoFOMSetParameters(t->fom, b->first));
-  PetscCall(Select(t, b, &N));
+  PetscCall(CondenseBodiesSelect(t, b, &N));
   for (PetscInt k = 0; k < b->n; k++) b->body[k].n = b->start[k + 1] - b->start[k];
   PetscCall(HycoBodiesSplit(t, N, factor));
   PetscCall(MatDestroy(&N));
@@ -498,7 +499,7 @@ static PetscErrorCode MakeModes(HycoReducer t, HycoSnapshots store)
   else if (t->scene->n_times)
     PetscCall(TakeNoStrains(t));
   PetscCall(HycoFOMCreate(HycoComm(t), t->scene, &factor.fom));
-  HycoFinally(Condense(t, store, &factor), PetscCall(HycoBodiesReleaseFactor(&factor)));
+  HycoFinally(CondenseAllBodies(t, store, &factor), PetscCall(HycoBodiesReleaseFactor(&factor)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

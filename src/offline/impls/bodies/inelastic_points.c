@@ -28,7 +28,7 @@ PetscInt HycoPointRows(HycoReducer t)
 
 /* The displacements of column k of the snapshots. Collective. The columns are in the file's order, the part's
    nodes with ghosts: rows travel between ranks. */
-static PetscErrorCode Displacement(void *ctx, PetscInt k, PetscReal u[])
+static PetscErrorCode InelasticPointsDisplacement(void *ctx, PetscInt k, PetscReal u[])
 {
   Sampler *s = (Sampler *)ctx;
   const PetscScalar *columns;
@@ -43,7 +43,7 @@ static PetscErrorCode Displacement(void *ctx, PetscInt k, PetscReal u[])
 }
 
 /* sqrt(w) of all points of inelastic bodies, which do not move along a path. */
-static PetscErrorCode Weigh(HycoFE fe, PetscReal scale[])
+static PetscErrorCode InelasticPointsWeigh(HycoFE fe, PetscReal scale[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
   PetscReal g[HYCO_CELL_NODES][3], w;
@@ -61,7 +61,7 @@ static PetscErrorCode Weigh(HycoFE fe, PetscReal scale[])
 }
 
 /* Stores the column of a listed time. Collective. */
-static PetscErrorCode Record(void *ctx, PetscInt k)
+static PetscErrorCode InelasticPointsRecord(void *ctx, PetscInt k)
 {
   Sampler *s = (Sampler *)ctx;
   const PetscInt nq = HycoElementGet(s->fe->mesh->type)->nq, ns = s->fe->n_sigma,
@@ -71,7 +71,7 @@ static PetscErrorCode Record(void *ctx, PetscInt k)
 
   PetscFunctionBegin;
   /* At the path's own parameters: bodies of other paths may be larger. */
-  if (step == 0) HycoOnEach(HycoComm(s->t), Weigh(s->fe, s->scale));
+  if (step == 0) HycoOnEach(HycoComm(s->t), InelasticPointsWeigh(s->fe, s->scale));
   for (PetscInt i = 0; i < s->fe->mesh->n_cells * nq; i++) {
     /* Points of elastic bodies stay 0: no mode has them, and Q-DEIM does not choose them. */
     if (!(s->scale[i] > 0)) continue;
@@ -105,7 +105,7 @@ static PetscErrorCode CreateSampler(HycoReducer t, HycoSnapshots store, Sampler 
   /* A column for each listed time of one path: paths are merged one by one. */
   PetscCall(MatCreateDense(HycoComm(t), (order ? order->n[HYCO_ON_CELLS] : part->n_cells) * size, PETSC_DECIDE,
                            t->sizes[1] * size, HycoSnapshotsSteps(t->scene), NULL, &s->S));
-  PetscCall(HycoTrainingReplayCreate(t, Displacement, Record, s, &s->replay));
+  PetscCall(HycoTrainingReplayCreate(t, InelasticPointsDisplacement, InelasticPointsRecord, s, &s->replay));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

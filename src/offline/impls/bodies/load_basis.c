@@ -234,7 +234,7 @@ static PetscErrorCode ValueAt(Vec v, PetscInt i, PetscReal *value)
 }
 
 /* The inverse of the k x k block of D (row major, r columns), row major. */
-static PetscErrorCode Invert(PetscInt k, PetscInt r, const PetscReal D[], PetscReal P[])
+static PetscErrorCode LoadBasisInvert(PetscInt k, PetscInt r, const PetscReal D[], PetscReal P[])
 {
   PetscReal *block;
 
@@ -262,7 +262,7 @@ static PetscErrorCode FindPoints(HycoSubstructures b, const HycoBodiesFactor *fa
   HycoVecDuplicate(factor->fom->F, &rest, &size);
   for (PetscInt k = 0; k < r; k++) {
     /* The interpolation through the points so far; the matrix grows by a row and a column. */
-    if (k) PetscCall(Invert(k, r, D, P));
+    if (k) PetscCall(LoadBasisInvert(k, r, D, P));
     for (PetscInt i = 0; i < k; i++) PetscCall(ValueAt(factor->basis[k], point[i], &at[i]));
     PetscCall(VecCopy(factor->basis[k], rest));
     for (PetscInt i = 0; i < k; i++) {
@@ -281,7 +281,7 @@ static PetscErrorCode FindPoints(HycoSubstructures b, const HycoBodiesFactor *fa
   }
   PetscCall(PetscMalloc1(r * r + 1, &b->A));
   /* Once more with all points: A turns values of F into coefficients. */
-  if (r) PetscCall(Invert(r, r, D, b->A));
+  if (r) PetscCall(LoadBasisInvert(r, r, D, b->A));
   HycoDestroyAll(&rest, &size);
   PetscCall(PetscFree4(D, P, c, at));
   PetscFunctionReturn(PETSC_SUCCESS);

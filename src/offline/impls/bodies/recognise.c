@@ -84,7 +84,7 @@ static PetscErrorCode MoveTo(HycoFOM f, const PetscReal mu[])
 }
 
 /* to = Q from (back: Q^T from) on this rank's unknowns, by body. */
-static PetscErrorCode Turn(const Compared *c, PetscBool back, Vec from, Vec to)
+static PetscErrorCode RecogniseRotate(const Compared *c, PetscBool back, Vec from, Vec to)
 {
   HycoMesh m = c->f->part;
   const PetscInt dim = m->dim;
@@ -129,7 +129,7 @@ static PetscErrorCode SetProbe(Compared *c)
 enum { AA, AB, BB, AT_FIXED, F00, F0F, FF, SUMS };
 
 /* Sums over the free unknowns of each body of a = Q K v and b = K(mu) Q v, and of the loads. */
-static PetscErrorCode Sums(Compared *c, PetscReal sum[])
+static PetscErrorCode RecogniseSums(Compared *c, PetscReal sum[])
 {
   HycoMesh m = c->f->part;
   const PetscInt dim = m->dim;
@@ -177,7 +177,7 @@ static PetscErrorCode Sums(Compared *c, PetscReal sum[])
 /* The largest entry of K(mu) Q v - kappa Q K v relative to the root of the mean square, by body: |b - kappa a| from the
    sums alone would be exact to the root of the round-off only. off: how far K(mu) is from a turned and scaled K; load:
    how far F is, without and with the factor. */
-static PetscErrorCode Distances(Compared *c, const PetscReal sum[])
+static PetscErrorCode RecogniseDistances(Compared *c, const PetscReal sum[])
 {
   HycoMesh m = c->f->part;
   const PetscInt dim = m->dim, n = c->parts->n;
@@ -201,7 +201,7 @@ static PetscErrorCode Distances(Compared *c, const PetscReal sum[])
       const PetscInt k = own * dim + d;
 
       if (c->f->fe->fixed[i * dim + d]) continue;
-      /* Entry by entry at the factor that Sums() has found. */
+      /* Entry by entry at the factor that RecogniseSums() has found. */
       r[0] += PetscSqr(b[k] - c->kappa[body] * Qa[d]);
       r[1] += PetscSqr(F[k] - QF[d]);
       r[2] += PetscSqr(F[k] - c->kappa[body] * QF[d]);
@@ -226,7 +226,7 @@ static PetscErrorCode Distances(Compared *c, const PetscReal sum[])
 }
 
 /* Poses, factors and changes of the loads at mu relative to the first point. Collective. */
-static PetscErrorCode Compare(Compared *c, const PetscReal mu[])
+static PetscErrorCode RecogniseCompare(Compared *c, const PetscReal mu[])
 {
   PetscReal *sum;
 
@@ -235,14 +235,14 @@ static PetscErrorCode Compare(Compared *c, const PetscReal mu[])
   PetscCall(HycoBodyPoses(c->f, c->parts->n, c->parts->of, c->X0, c->pose));
   HycoOnEach(HycoComm(c->f), HycoFEAssembleStiffness(c->f->fe, c->K));
   HycoOnEach(HycoComm(c->f), HycoFEAssembleForce(c->f->fe, c->F));
-  PetscCall(Turn(c, PETSC_FALSE, c->v, c->now));
+  PetscCall(RecogniseRotate(c, PETSC_FALSE, c->v, c->now));
   PetscCall(MatMult(c->K, c->now, c->product));
   PetscCall(PetscMalloc1(SUMS * c->parts->n, &sum));
-  PetscCall(Sums(c, sum));
+  PetscCall(RecogniseSums(c, sum));
   /* The factor in the sense of least squares. */
   for (PetscInt k = 0; k < c->parts->n; k++)
     c->kappa[k] = sum[SUMS * k + AA] > 0 ? sum[SUMS * k + AB] / sum[SUMS * k + AA] : 1;
-  PetscCall(Distances(c, sum));
+  PetscCall(RecogniseDistances(c, sum));
   PetscCall(PetscFree(sum));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -250,7 +250,7 @@ static PetscErrorCode Compare(Compared *c, const PetscReal mu[])
 /* The ways in which body k differs from the first point. A ratio kappa / s^p apart from 1 is a change of moduli;
    without it, kappa is that of the size alone. Loads count as unchanged if they are F or kappa F: prescribed
    displacements act by K. */
-static PetscInt Ways(const Compared *c, PetscInt k)
+static PetscInt RecogniseDifferences(const Compared *c, PetscInt k)
 {
   const HycoPose *pose = &c->pose[k];
   const PetscReal scaled = PetscPowReal(pose->s, (PetscReal)HycoPosePower(c->f->fe));
@@ -270,7 +270,7 @@ static PetscInt Ways(const Compared *c, PetscInt k)
 /* Whether the nodes of each body have moved, beyond turning and scaling. Collective. A pose has no translation, which
    changes neither K nor its axes but the place of the contacts. Relative to the whole mesh's extent: a small body far
    from the origin has no more digits. */
-static PetscErrorCode Shifted(Compared *c, PetscBool moved[])
+static PetscErrorCode RecogniseShifted(Compared *c, PetscBool moved[])
 {
   const PetscReal length = HycoMeshLength(c->f->part);
 
@@ -306,7 +306,7 @@ static PetscErrorCode StaysBehind(const Compared *c, const HycoFixed *fixed, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* support[]: by body, as in HycoBodyParts. After Compare(). Collective. */
+/* support[]: by body, as in HycoBodyParts. After RecogniseCompare(). Collective. */
 static PetscErrorCode FindSupports(const Compared *c, PetscInt support[])
 {
   HycoMesh m = c->f->part;
@@ -327,7 +327,7 @@ static PetscErrorCode FindSupports(const Compared *c, PetscInt support[])
 
       /* A body that changes its shape has no turn. */
       if (own < 0 || c->pose[c->parts->of[i]].residual > SIMILAR) continue;
-      /* As in Sums(): the turned probe does not vanish there. */
+      /* As in RecogniseSums(): the turned probe does not vanish there. */
       for (PetscInt d = 0; d < m->dim; d++)
         stays = (PetscBool)(stays || (fixed->value[d] && PetscAbsReal(v[own * m->dim + d]) > SIMILAR));
       if (fixed->normal && !stays) PetscCall(StaysBehind(c, fixed, i, &stays));
@@ -339,7 +339,8 @@ static PetscErrorCode FindSupports(const Compared *c, PetscInt support[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Stores nodes, K v and F at this point, with which the others are compared. Collective. K v for one v (SetProbe()) in place of K: matrices that differ agree on it by chance only. */
+/* Stores nodes, K v and F at this point, with which the others are compared. Collective. K v for one v (SetProbe()) in
+   place of K: matrices that differ agree on it by chance only. */
 static PetscErrorCode SetReference(Compared *c, const PetscReal mu[])
 {
   PetscFunctionBegin;
@@ -373,16 +374,16 @@ static PetscErrorCode VisitTogether(Compared *c, const PetscReal first[])
     }
     for (PetscInt k = 0; k < n; k++) from[shape[k]] = mu[shape[k]];
     if (n) PetscCall(SetReference(c, from));
-    PetscCall(Compare(c, mu));
+    PetscCall(RecogniseCompare(c, mu));
     for (PetscInt k = 0; k < c->parts->n; k++)
-      if (Ways(c, k) & HYCO_ENTERS_SHAPE) c->parts->together[k] = PETSC_FALSE;
+      if (RecogniseDifferences(c, k) & HYCO_ENTERS_SHAPE) c->parts->together[k] = PETSC_FALSE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Each parameter alone at two points. Collective. Two points inside the range: one could be a mirror or a period
    of an expression, at which nothing seems to change. */
-static PetscErrorCode Visit(Compared *c, const PetscReal first[])
+static PetscErrorCode RecogniseVisit(Compared *c, const PetscReal first[])
 {
   /* Not at simple fractions, where symmetric expressions have equal values. */
   static const PetscReal share[2] = {0.137, 0.829};
@@ -399,11 +400,11 @@ static PetscErrorCode Visit(Compared *c, const PetscReal first[])
     if (!(s->hi[p] > s->lo[p])) continue;
     PetscCall(PetscArraycpy(mu, first, s->n_variables));
     mu[p] = s->lo[p] + share[q % 2] * (s->hi[p] - s->lo[p]);
-    PetscCall(Compare(c, mu));
-    PetscCall(Shifted(c, moved));
+    PetscCall(RecogniseCompare(c, mu));
+    PetscCall(RecogniseShifted(c, moved));
     PetscCall(FindSupports(c, support));
     for (PetscInt k = 0; k < c->parts->n; k++) {
-      PetscInt ways = Ways(c, k);
+      PetscInt ways = RecogniseDifferences(c, k);
 
       /* A body that is only moved needs no sample: in its own axes it stays the same. */
       if (moved[k] && !(ways & (HYCO_ENTERS_SHAPE | HYCO_ENTERS_SIZE))) ways |= HYCO_ENTERS_PLACE;
@@ -420,7 +421,7 @@ static PetscErrorCode CompareAll(Compared *c, const PetscReal first[])
 {
   PetscFunctionBegin;
   PetscCall(SetReference(c, first));
-  PetscCall(Visit(c, first));
+  PetscCall(RecogniseVisit(c, first));
   PetscCall(VisitTogether(c, first));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -456,8 +457,8 @@ PetscErrorCode HycoBodyPartsFind(HycoFOM f, const PetscReal first[], HycoBodyPar
 
 /* -- in words -- */
 
-/* "moves body cylinder rigidly, changes the loads of body block"; "" if the parameter enters no body. Loads of a path depend
-   on time, and are not told. */
+/* "moves body cylinder rigidly, changes the loads of body block"; "" if the parameter enters no body. Loads of a path
+   depend on time, and are not told. */
 static PetscErrorCode DescribeOne(HycoScene s, const HycoBodyParts *parts, PetscInt p, char text[HYCO_LINE])
 {
   static const struct {

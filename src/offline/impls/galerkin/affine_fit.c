@@ -12,7 +12,7 @@
 #define N_CHECKS 3
 
 /* The assembled matrix at mu. */
-static PetscErrorCode Sample(HycoROM m, const PetscReal mu[], PetscInt entries, PetscReal value[])
+static PetscErrorCode AffineFitSample(HycoROM m, const PetscReal mu[], PetscInt entries, PetscReal value[])
 {
   PetscScalar *a;
   PetscInt n;
@@ -27,7 +27,7 @@ static PetscErrorCode Sample(HycoROM m, const PetscReal mu[], PetscInt entries, 
 
 /* Whether the table reproduces the matrix at mu. At a point that made no entry of the table: agreement there is
    evidence of a polynomial. */
-static PetscErrorCode Agrees(HycoROM m, HycoTable t, const PetscReal mu[], PetscBool *agrees)
+static PetscErrorCode AffineFitAgrees(HycoROM m, HycoTable t, const PetscReal mu[], PetscBool *agrees)
 {
   const PetscInt entries = t->values.rows;
   PetscReal *here, *there, *largest;
@@ -36,7 +36,7 @@ static PetscErrorCode Agrees(HycoROM m, HycoTable t, const PetscReal mu[], Petsc
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(entries, &here, entries, &there, m->n, &largest));
   PetscCall(PetscMalloc1(entries, &row));
-  PetscCall(Sample(m, mu, entries, here));
+  PetscCall(AffineFitSample(m, mu, entries, here));
   /* Relative to the largest entry of its row: full-order rows and modes' rows differ by orders of magnitude. */
   PetscCall(HycoReducedRows(m, row));
   PetscCall(HycoGridFieldEvaluate(&t->values, mu, there));
@@ -63,14 +63,14 @@ static PetscErrorCode FillTable(HycoROM m, HycoTable t)
       mu[p] = t->x[p][rest % tensor->n[p]];
       rest /= tensor->n[p];
     }
-    PetscCall(Sample(m, mu, t->values.rows, t->values.data + (size_t)node * (size_t)t->values.rows));
+    PetscCall(AffineFitSample(m, mu, t->values.rows, t->values.data + (size_t)node * (size_t)t->values.rows));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Creates a table with n[p] values of each parameter, and checks it at some points off its nodes. */
-static PetscErrorCode Try(HycoROM m, const PetscInt n[], PetscInt entries, PetscInt varied, HycoTable *table,
-                          PetscBool *holds)
+static PetscErrorCode AffineFitTry(HycoROM m, const PetscInt n[], PetscInt entries, PetscInt varied, HycoTable *table,
+                                   PetscBool *holds)
 {
   const HycoScene s = m->model->scene;
   PetscReal *x[HYCO_MAX_PARAMETERS], mu[HYCO_MAX_PARAMETERS];
@@ -93,7 +93,7 @@ static PetscErrorCode Try(HycoROM m, const PetscInt n[], PetscInt entries, Petsc
       /* One parameter varies for its own degree; all together for the table itself. */
       mu[p] = varied < 0 || p == varied ? s->lo[p] + part * (s->hi[p] - s->lo[p]) : (s->lo[p] + s->hi[p]) / 2;
     }
-    PetscCall(Agrees(m, *table, mu, holds));
+    PetscCall(AffineFitAgrees(m, *table, mu, holds));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -111,7 +111,7 @@ static PetscErrorCode CountValues(HycoROM m, PetscInt p, PetscInt entries, Petsc
   for (n[p] = 2; n[p] <= MOST && !holds; n[p]++) {
     HycoTable table;
 
-    PetscCall(Try(m, n, entries, p, &table, &holds));
+    PetscCall(AffineFitTry(m, n, entries, p, &table, &holds));
     PetscCall(HycoTableDestroy(&table));
     *count = n[p];
   }
@@ -120,7 +120,7 @@ static PetscErrorCode CountValues(HycoROM m, PetscInt p, PetscInt entries, Petsc
 }
 
 /* Rank 0. Not finding a table is no failure: predictions then assemble. A stiffness that is a polynomial in the
-   parameters is exact in the table; others are refused by Agrees(), which is why no error is added. */
+   parameters is exact in the table; others are refused by AffineFitAgrees(), which is why no error is added. */
 PetscErrorCode HycoGalerkinTabulate(HycoROM m, const PetscBool reaches[])
 {
   HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
@@ -147,7 +147,7 @@ PetscErrorCode HycoGalerkinTabulate(HycoROM m, const PetscBool reaches[])
     if (nodes > HYCO_TABLE_NODES || (PetscReal)nodes * (PetscReal)entries > ENTRIES) nodes = 0;
   }
   if (!nodes) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Try(m, n, entries, -1, &table, &holds)); /* without a table, the model assembles */
+  PetscCall(AffineFitTry(m, n, entries, -1, &table, &holds)); /* without a table, the model assembles */
   if (holds) PetscCall(HycoTableKeepPattern(m, table));
   if (holds)
     g->table = table;

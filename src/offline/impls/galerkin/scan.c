@@ -83,7 +83,7 @@ static PetscErrorCode ScanMine(HycoROM m, const PetscBool reaches[], PetscInt ea
 }
 
 /* "(0.05, 0.17)" */
-static void Say(HycoScene s, const PetscReal mu[], char text[HYCO_LINE])
+static void ScanFormatPoint(HycoScene s, const PetscReal mu[], char text[HYCO_LINE])
 {
   size_t at = 0;
 
@@ -93,8 +93,8 @@ static void Say(HycoScene s, const PetscReal mu[], char text[HYCO_LINE])
 }
 
 /* Stores the result of the scan in the model; fails if the determinant changes sign. */
-static PetscErrorCode Conclude(HycoReducer t, HycoROM m, const PetscBool reaches[], PetscInt each,
-                               const PetscReal sign[], const PetscReal ratio[])
+static PetscErrorCode ScanConclude(HycoReducer t, HycoROM m, const PetscBool reaches[], PetscInt each,
+                                   const PetscReal sign[], const PetscReal ratio[])
 {
   HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
   HycoScan *s = &g->scan;
@@ -116,9 +116,9 @@ static PetscErrorCode Conclude(HycoReducer t, HycoROM m, const PetscBool reaches
   /* Without a change of sign a small singular value alone is no proof; it is stored and shown. */
   if (t->keep_singular || (!change && ratio[worst] > 0)) PetscFunctionReturn(PETSC_SUCCESS);
   GridPoint(m->model->scene, reaches, each, PetscMax(change - 1, 0), mu);
-  Say(m->model->scene, mu, here);
+  ScanFormatPoint(m->model->scene, mu, here);
   GridPoint(m->model->scene, reaches, each, change, mu);
-  Say(m->model->scene, mu, there);
+  ScanFormatPoint(m->model->scene, mu, there);
   HycoFailNoModel(
       "the reduced stiffness is singular inside the parameters' ranges: between %s and %s its determinant "
       "changes sign, and predictions near there are arbitrary; enlarge the RID (-hyco_rid_layers 1), change "
@@ -176,7 +176,7 @@ static PetscErrorCode ConcludePaths(HycoReducer t, HycoROM m, PetscInt n, PetscI
   /* The path is named by its parameters; its time would not help to choose settings. */
   PetscCall(PetscArraycpy(s->at, mu + worst / each * n_par, n_par));
   if (t->keep_singular || !s->n_singular) PetscFunctionReturn(PETSC_SUCCESS);
-  Say(m->model->scene, mu + change / each * n_par, here);
+  ScanFormatPoint(m->model->scene, mu + change / each * n_par, here);
   HycoFailNoModel(
       "the reduced tangent becomes singular along the training path at %s: its determinant changes sign at %d "
       "of %d times, and predictions near there are arbitrary; enlarge the RID (-hyco_rid_layers 1), change the modes "
@@ -208,9 +208,9 @@ static PetscErrorCode ScanPaths(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Each rank scans its share of the grid; rank 0 concludes from all signs and ratios. Models with more unknowns than LARGEST
-   are not scanned: each point needs a dense factorisation. */
-static PetscErrorCode Scan(HycoReducer t, HycoROM m, PetscBool reaches[])
+/* Each rank scans its share of the grid; rank 0 concludes from all signs and ratios. Models with more unknowns than
+   LARGEST are not scanned: each point needs a dense factorisation. */
+static PetscErrorCode ScanGrid(HycoReducer t, HycoROM m, PetscBool reaches[])
 {
   HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
   PetscInt each = 0;
@@ -227,7 +227,7 @@ static PetscErrorCode Scan(HycoReducer t, HycoROM m, PetscBool reaches[])
                                    (t->rank + 1) * g->scan.n / HycoSize(HycoComm(t)), sign, ratio));
   HycoAllreduce(sign, g->scan.n, MPIU_REAL, MPI_SUM, HycoComm(t));
   HycoAllreduce(ratio, g->scan.n, MPIU_REAL, MPI_SUM, HycoComm(t));
-  HycoOnRoot(HycoComm(t), Conclude(t, m, reaches, each, sign, ratio));
+  HycoOnRoot(HycoComm(t), ScanConclude(t, m, reaches, each, sign, ratio));
   PetscCall(PetscFree2(sign, ratio));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -242,7 +242,7 @@ PetscErrorCode HycoGalerkinFinish(HycoReducer t, HycoROM m, HycoTraining *report
   if (t->scene->n_times)
     PetscCall(ScanPaths(t, m));
   else {
-    PetscCall(Scan(t, m, reaches));
+    PetscCall(ScanGrid(t, m, reaches));
     /* One rank suffices: a table has few nodes. */
     HycoOnRoot(HycoComm(t), HycoGalerkinTabulate(m, reaches));
   }
@@ -252,7 +252,8 @@ PetscErrorCode HycoGalerkinFinish(HycoReducer t, HycoROM m, HycoTraining *report
 }
 
 /* A sparse factor (bordered paths) is linear in n; then the cells' laws, and the modes' products. In operations of a
-   prediction: LU of the reduced matrix, assembly of the RID's cells, products with the modes. Only comparisons of attempts use it. */
+   prediction: LU of the reduced matrix, assembly of the RID's cells, products with the modes. Only comparisons of
+   attempts use it. */
 PetscReal HycoGalerkinCost(HycoReducer t, const HycoAttempt *a)
 {
   const PetscReal dim = t->sizes[3],

@@ -62,7 +62,7 @@ static PetscErrorCode ListRows(HycoROM m, PetscInt *n, PetscInt **row)
 }
 
 /* The unknown of each row of A_lambda that may be full order: its largest entry in A not taken by another. */
-static PetscErrorCode Candidates(HycoROM m, PetscInt n, const PetscInt row[], PetscInt candidate[])
+static PetscErrorCode FullOrderUnknownsCandidates(HycoROM m, PetscInt n, const PetscInt row[], PetscInt candidate[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
   const PetscInt dim = m->model->mesh->dim;
@@ -127,7 +127,7 @@ static PetscErrorCode RowRank(HycoROM m, PetscReal *ratio)
 }
 
 /* The model at the middle of the parameters' ranges, without full-order unknowns, to inspect its rows. */
-static PetscErrorCode Assembled(HycoReducer t, HycoROM m)
+static PetscErrorCode FullOrderUnknownsAssembled(HycoReducer t, HycoROM m)
 {
   PetscInt n_par;
   const PetscReal *mu;
@@ -178,7 +178,7 @@ static PetscErrorCode ContactRows(HycoROM m, PetscInt n, const PetscInt row[], c
   IS candidates, unknowns, listed, rows;
 
   PetscFunctionBegin;
-  /* B at the training parameters that Assembled() has set. */
+  /* B at the training parameters that FullOrderUnknownsAssembled() has set. */
   PetscCall(HycoGalerkinContactMatrix(m));
   PetscCall(ISCreateStride(PETSC_COMM_SELF, m->fe->n_dof, 0, 1, &unknowns));
   PetscCall(ISCreateGeneral(PETSC_COMM_SELF, n, candidate, PETSC_COPY_VALUES, &candidates));
@@ -190,8 +190,8 @@ static PetscErrorCode ContactRows(HycoROM m, PetscInt n, const PetscInt row[], c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Numerical rank of B[A_lambda, A_c] V[A_c,:] and the n listed rows that the modes resolve best (first `rank` of pivot), by
-   their balance rows K V or by their rows B V weighted with the singular values. */
+/* Numerical rank of B[A_lambda, A_c] V[A_c,:] and the n listed rows that the modes resolve best (first `rank` of
+   pivot), by their balance rows K V or by their rows B V weighted with the singular values. */
 static PetscErrorCode ResolvedRows(HycoROM m, PetscInt n, const PetscInt row[], const PetscInt candidate[],
                                    PetscBool balance, PetscInt *rank, PetscInt pivot[])
 {
@@ -235,7 +235,7 @@ static PetscErrorCode JudgeSet(HycoReducer t, HycoROM m, PetscInt n, const Petsc
 {
   PetscFunctionBegin;
   PetscCall(HycoROMSetFE(m, HYCO_HYBRID_RANK, n, dof));
-  PetscCall(Assembled(t, m));
+  PetscCall(FullOrderUnknownsAssembled(t, m));
   PetscCall(RowRank(m, &v->rank));
   v->u = v->lambda = WORST;
   /* A rank-deficient choice is not worth a prediction of every snapshot. */
@@ -244,16 +244,16 @@ static PetscErrorCode JudgeSet(HycoReducer t, HycoROM m, PetscInt n, const Petsc
 }
 
 /* Of equal errors the better conditioned, so that round-off does not choose. */
-static PetscBool Better(const Verdict *a, const Verdict *b)
+static PetscBool FullOrderUnknownsBetter(const Verdict *a, const Verdict *b)
 {
   if (a->u < b->u * (1 - SAME)) return PETSC_TRUE;
   return (PetscBool)(a->u <= b->u * (1 + SAME) && a->rank > b->rank * (1 + SAME));
 }
 
-/* Exchanges one of n full-order unknowns for one of N candidates while the error decreases. chosen[k]: candidate k is full
-   order. */
-static PetscErrorCode Exchange(HycoReducer t, HycoROM m, PetscInt N, PetscInt n, const PetscInt candidate[],
-                               PetscBool chosen[], Verdict *best)
+/* Exchanges one of n full-order unknowns for one of N candidates while the error decreases. chosen[k]: candidate k is
+   full order. */
+static PetscErrorCode FullOrderUnknownsExchange(HycoReducer t, HycoROM m, PetscInt N, PetscInt n,
+                                                const PetscInt candidate[], PetscBool chosen[], Verdict *best)
 {
   /* a trial solves every snapshot: their number is limited by the work, so that a large model does not take hours */
   const PetscInt limit = ((Training)t->training)->trials ? ((Training)t->training)->trials
@@ -289,7 +289,7 @@ static PetscErrorCode Exchange(HycoReducer t, HycoROM m, PetscInt N, PetscInt n,
           PetscCall(HycoReducerTell(t, "choices of full-order displacements", trials, limit));
           trials++;
           PetscCall(JudgeSet(t, m, n, dof, round.u * (1 + SAME), &verdict));
-          if (Better(&verdict, &round)) {
+          if (FullOrderUnknownsBetter(&verdict, &round)) {
             round = verdict;
             out = i;
             in = j;
@@ -321,10 +321,10 @@ static PetscErrorCode SearchFrom(HycoReducer t, HycoROM m, PetscInt start, Petsc
   PetscFunctionBegin;
   /* No full-order unknowns: the rank of (38) is that of the modes alone. */
   PetscCall(HycoROMSetFE(m, HYCO_HYBRID_RANK, 0, NULL));
-  PetscCall(Assembled(t, m));
+  PetscCall(FullOrderUnknownsAssembled(t, m));
   PetscCall(ListRows(m, &N, &row));
   PetscCall(PetscMalloc3(N, &candidate, N, &pivot, N, &chosen));
-  PetscCall(Candidates(m, N, row, candidate));
+  PetscCall(FullOrderUnknownsCandidates(m, N, row, candidate));
   PetscCall(ResolvedRows(m, N, row, candidate, (PetscBool)(start == 0), &rank, pivot));
   PetscCall(PetscFree(row));
   for (PetscInt k = 0; k < N; k++) chosen[k] = (PetscBool)(start < 2);
@@ -339,7 +339,7 @@ static PetscErrorCode SearchFrom(HycoReducer t, HycoROM m, PetscInt start, Petsc
     }
     if (pass) break;
     PetscCall(JudgeSet(t, m, *n, dof, PETSC_INFINITY, verdict));
-    if (*n && *n < N) PetscCall(Exchange(t, m, N, *n, candidate, chosen, verdict));
+    if (*n && *n < N) PetscCall(FullOrderUnknownsExchange(t, m, N, *n, candidate, chosen, verdict));
   }
   PetscCall(PetscFree3(candidate, pivot, chosen));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -359,7 +359,7 @@ static PetscErrorCode ChooseRank(HycoReducer t, HycoROM m, Verdict *best)
   for (PetscInt start = 0; start < starts; start++) {
     PetscCall(SearchFrom(t, m, start, &other, trial, &verdict));
     /* The first start holds unless another is better: an order without ties by chance. */
-    if (start && !Better(&verdict, best)) continue;
+    if (start && !FullOrderUnknownsBetter(&verdict, best)) continue;
     *best = verdict;
     n = other;
     PetscCall(PetscArraycpy(dof, trial, n));
@@ -423,7 +423,7 @@ static PetscErrorCode FreeUnknowns(HycoReducer t, HycoROM m, PetscBool contact_o
 
 /* The ridge for paths: each trial takes seconds, and some of the paths suffice to reject a ridge that is worse than
    the best. Fails if an attempt of the search has training errors of one half with any ridge. */
-static PetscErrorCode RaceRidges(HycoReducer t, HycoROM m, PetscReal *strength)
+static PetscErrorCode EarlyStopRidges(HycoReducer t, HycoROM m, PetscReal *strength)
 {
   HycoJudged *judged, *its;
   PetscInt n, in_a_row = 0;
@@ -439,7 +439,8 @@ static PetscErrorCode RaceRidges(HycoReducer t, HycoROM m, PetscReal *strength)
 
     /* A new regression of the modes on A's unknowns; the reduced matrix follows. */
     PetscCall(HycoGalerkinSetRidge(m, ridge));
-    PetscCall(HycoReducerJudgeRace(t, m, any ? its : NULL, t->trying ? USELESS : PETSC_INFINITY, judged, &u, &lost));
+    PetscCall(
+        HycoReducerJudgeEarlyStop(t, m, any ? its : NULL, t->trying ? USELESS : PETSC_INFINITY, judged, &u, &lost));
     /* Errors have one minimum over the ridge as a rule: after LOST worse ones in a row the search ends. */
     in_a_row += any;
     if (lost || !(u < least)) continue;
@@ -489,7 +490,7 @@ static PetscErrorCode ChooseAll(HycoReducer t, HycoROM m, PetscInt n, const Pets
   PetscCall(ISGetLocalSize(m->model->rid, &n_rid));
   PetscCall(ISGetLocalSize(m->model->inside, &n_A));
   if (n_rid == n_A) PetscFunctionReturn(PETSC_SUCCESS);
-  if (strength < 0) PetscCall(t->scene->n_times ? RaceRidges(t, m, &strength) : TryRidges(t, m, &strength));
+  if (strength < 0) PetscCall(t->scene->n_times ? EarlyStopRidges(t, m, &strength) : TryRidges(t, m, &strength));
   PetscCall(HycoGalerkinSetRidge(m, strength));
   /* The attempt's choice: the final model is built with it, without another race. */
   if (t->trying) t->ridge = strength;
@@ -604,7 +605,7 @@ static PetscErrorCode FrictionSnapshots(HycoReducer t, HycoROM m)
 }
 
 /* The dual snapshots first: judging does not reconstruct, but the file and predictions need them. */
-static PetscErrorCode Build(HycoROM m, HycoReducer t)
+static PetscErrorCode FullOrderUnknownsBuild(HycoROM m, HycoReducer t)
 {
   HycoHybridModel h = (HycoHybridModel)m->model->data;
 
@@ -618,14 +619,14 @@ static PetscErrorCode Build(HycoROM m, HycoReducer t)
 }
 
 /* The default type. */
-static PetscBool Offers(HycoReducer t, PetscBool targets, size_t length, char why[])
+static PetscBool FullOrderUnknownsIsOffered(HycoReducer t, PetscBool targets, size_t length, char why[])
 {
   (void)t, (void)targets, (void)length, (void)why;
   return PETSC_TRUE;
 }
 
 /* The text that training prints; a report has the same numbers one by one. */
-static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
+static PetscErrorCode FullOrderUnknownsReport(HycoReducer t, HycoROM m, HycoTraining *r)
 {
   PetscFunctionBegin;
   (void)t, (void)m;
@@ -643,10 +644,10 @@ PetscErrorCode HycoTrainerCreate_Hybrid(HycoTrainerOps *ops)
 {
   PetscFunctionBegin;
   *ops = (HycoTrainerOps){.setfromoptions = SetFromOptions,
-                          .build = Build,
+                          .build = FullOrderUnknownsBuild,
                           .finish = HycoGalerkinFinish,
-                          .report = Report,
+                          .report = FullOrderUnknownsReport,
                           .cost = HycoGalerkinCost,
-                          .offers = Offers};
+                          .offers = FullOrderUnknownsIsOffered};
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -56,7 +56,7 @@ static PetscErrorCode SetFromOptions(HycoReducer t)
 
 /* Offered as a last resort if targets are given. It may need more modes than a hybrid model and assembles the
    whole mesh: only for a user who insists on targets. */
-static PetscBool Offers(HycoReducer t, PetscBool targets, size_t length, char why[])
+static PetscBool ForceBasisIsOffered(HycoReducer t, PetscBool targets, size_t length, char why[])
 {
   (void)t, (void)length, (void)why;
   return targets;
@@ -100,7 +100,7 @@ static PetscErrorCode RemoveModes(HycoReducer t, Mat X)
 
 /* Appends q columns of Q to the reducer's modes, with their singular values and the snapshots' coefficients, of
    which QtU are those of Q (n_q x n_s column major). */
-static PetscErrorCode Append(HycoReducer t, PetscInt q, Mat Q, PetscInt n_q, const PetscReal QtU[])
+static PetscErrorCode ForceBasisAppend(HycoReducer t, PetscInt q, Mat Q, PetscInt n_q, const PetscReal QtU[])
 {
   const PetscInt l = t->l, both = l + q;
   PetscReal *VtU, *sigma;
@@ -150,7 +150,7 @@ static PetscErrorCode ProjectBatch(HycoReducer t, PetscInt first, Mat S, void *c
 /* Appends to the modes the components of the supremizers of the dual snapshots that are orthogonal to them: l, V, sigma
    (0 for these) and VtU then have more columns. Supremizers keep the reduced saddle-point problem solvable (Ballarin et
    al. 2015): each force vector has a displacement that it works on. */
-static PetscErrorCode Enrich(HycoReducer t)
+static PetscErrorCode ForceBasisEnrich(HycoReducer t)
 {
   PetscReal *QtU, *size;
   PetscInt found, q = 0;
@@ -173,7 +173,7 @@ static PetscErrorCode Enrich(HycoReducer t)
   if (q) {
     PetscCall(PetscMalloc1(found * t->n_s, &QtU));
     PetscCall(HycoReducerEachBatch(t, ProjectBatch, &(Projected){Q, found, QtU}));
-    PetscCall(Append(t, q, Q, found, QtU));
+    PetscCall(ForceBasisAppend(t, q, Q, found, QtU));
     PetscCall(PetscFree(QtU));
   }
   PetscCall(MatDestroy(&Q));
@@ -188,7 +188,7 @@ PetscErrorCode HycoProjectionModes(HycoReducer t, HycoSnapshots store)
   PetscFunctionBegin;
   (void)store;
   s->n_supremizers = 0;
-  if (s->dual == HYCO_DUAL_SNAPSHOTS) PetscCall(Enrich(t));
+  if (s->dual == HYCO_DUAL_SNAPSHOTS) PetscCall(ForceBasisEnrich(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -257,7 +257,7 @@ PetscErrorCode HycoProjectionJudge(HycoROM m, HycoReducer t)
 }
 
 /* No full-order unknown: HYCO_HYBRID_CONTACT with an empty set. */
-static PetscErrorCode Build(HycoROM m, HycoReducer t)
+static PetscErrorCode ForceBasisBuild(HycoROM m, HycoReducer t)
 {
   PetscFunctionBegin;
   PetscCall(HycoProjectionMakeBasis(m, t));
@@ -289,10 +289,10 @@ PetscErrorCode HycoTrainerCreate_Projection(HycoTrainerOps *ops)
   PetscFunctionBegin;
   *ops = (HycoTrainerOps){.setfromoptions = SetFromOptions,
                           .modes = HycoProjectionModes,
-                          .build = Build,
+                          .build = ForceBasisBuild,
                           .finish = HycoGalerkinFinish,
                           .report = HycoProjectionReport,
                           .cost = HycoGalerkinCost,
-                          .offers = Offers};
+                          .offers = ForceBasisIsOffered};
   PetscFunctionReturn(PETSC_SUCCESS);
 }

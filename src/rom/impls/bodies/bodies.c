@@ -8,8 +8,8 @@
 #include <petscviewer.h>
 #include <string.h>
 
-/* The estimate of u over what the modes miss at the checks: a response that no sample has is missed ten times as much as the
-   worst of some tens of points. */
+/* The estimate of u over what the modes miss at the checks: a response that no sample has is missed ten times as much
+   as the worst of some tens of points. */
 #define BEYOND   10
 #define ROUNDING 1e-10 /* relative, of exact results */
 
@@ -26,7 +26,7 @@ static PetscErrorCode SetUp(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Reset(HycoROM m)
+static PetscErrorCode BodiesReset(HycoROM m)
 {
   PetscFunctionBegin;
   PetscCall(HycoBodiesReset((HycoBodiesWork)m->work));
@@ -45,9 +45,10 @@ PetscErrorCode HycoBodiesDestroyModel(HycoROM m)
 
 #define ROUNDED 1e-6 /* most of a residual that may be the effect of rounding */
 
-/* What is left of the gap of contact k; *rounding: the effect of rounding the terms whose sum the displacements are, since a
-   body on a soft spring moves far without contact and is pushed back as far. At most ROUNDED of `gaps`: more is an error. */
-static PetscReal Left(HycoROM m, PetscInt k, PetscReal gaps, PetscReal *rounding)
+/* What is left of the gap of contact k; *rounding: the effect of rounding the terms whose sum the displacements are,
+   since a body on a soft spring moves far without contact and is pushed back as far. At most ROUNDED of `gaps`: more is
+   an error. */
+static PetscReal BodiesRemainingGap(HycoROM m, PetscInt k, PetscReal gaps, PetscReal *rounding)
 {
   const HycoBodiesWork o = (HycoBodiesWork)m->work;
   PetscReal terms = 0;
@@ -86,7 +87,7 @@ PetscReal HycoBodiesMeasure(HycoROM m, HycoKKT *kkt)
   /* Quotients first: products may overflow. */
   for (PetscInt k = 0; k < m->model->pairs.n && gaps > 0; k++) {
     PetscReal rounding;
-    const PetscReal left = Left(m, k, gaps, &rounding) / gaps, share = most > 0 ? m->Lambda[k] / most : 0,
+    const PetscReal left = BodiesRemainingGap(m, k, gaps, &rounding) / gaps, share = most > 0 ? m->Lambda[k] / most : 0,
                     more = PetscMax(PetscAbsReal(left) - rounding / gaps, 0);
 
     if (m->rows.start[k] == m->rows.start[k + 1]) continue;
@@ -99,7 +100,7 @@ PetscReal HycoBodiesMeasure(HycoROM m, HycoKKT *kkt)
 }
 
 /* The modes where displacements are not exact. */
-static void Expand(HycoROM m, const PetscInt loc[])
+static void BodiesExpand(HycoROM m, const PetscInt loc[])
 {
   const PetscInt l = m->model->l;
 
@@ -118,7 +119,7 @@ static PetscErrorCode ExpandAll(HycoROM m)
 
   PetscFunctionBegin;
   PetscCall(HycoBodiesExpand(o, m->gamma));
-  Expand(m, o->loc);
+  BodiesExpand(m, o->loc);
   HycoBodiesMove(o, &s, m->U);
   HycoFEComplete(m->fe, m->U);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -128,12 +129,12 @@ static PetscErrorCode ExpandAll(HycoROM m)
 static PetscErrorCode NameLifted(HycoROM m, const HycoBodiesSurface *s)
 {
   HycoPrediction *p = &m->prediction;
-  PetscBool lifts;
+  PetscBool lift_off;
   char name[HYCO_LINE] = "";
 
   PetscFunctionBegin;
-  PetscCall(HycoBodiesLifts((HycoBodiesWork)m->work, s, m->Lambda, name, &lifts));
-  if (!lifts) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoBodiesLiftOff((HycoBodiesWork)m->work, s, m->Lambda, name, &lift_off));
+  if (!lift_off) PetscFunctionReturn(PETSC_SUCCESS);
   p->reason = HYCO_DIVERGED_FLOATING;
   PetscCall(PetscSNPrintf(p->why, sizeof(p->why), "%s%s%s", HycoReasonName(p->reason),
                           name[0] ? "; no support keeps " : "", name));
@@ -142,7 +143,7 @@ static PetscErrorCode NameLifted(HycoROM m, const HycoBodiesSurface *s)
 
 /* Assembly is the rows' search and gaps; a factor does not exist. The reason of the solver counts only if the
    recomputed residuals agree. */
-static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
+static PetscErrorCode BodiesSolve(HycoROM m, const PetscReal mu[])
 {
   HycoBodiesWork o = (HycoBodiesWork)m->work;
   HycoPrediction *p = &m->prediction;
@@ -161,11 +162,12 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
   m->imbalance = HycoBodiesImbalance(o);
   /* The bound of theory.md: from the samples' error e and the present forces; 0 where nothing is interpolated. */
   p->interpolation_error = HycoBodiesBound(o, &norm);
-  PetscCall(HycoBodiesLoose(o, m->model->pairs.n, m->Lambda, &p->loose));
+  PetscCall(HycoBodiesFreeMotion(o, m->model->pairs.n, m->Lambda, &p->loose));
   if (p->loose) HycoBodiesNameFloating(o, m->model->scene, m->loose);
   p->iterations = o->its;
   p->reason = solved && residual > m->solver->rtol ? HYCO_DIVERGED_RESIDUAL : o->reason;
-  /* As at full order: a method that ends without an answer of its own may have found it, but not beside the surfaces. */
+  /* As at full order: a method that ends without an answer of its own may have found it, but not beside the
+     surfaces. */
   if (!o->lacks && residual <= m->solver->rtol) p->reason = HYCO_CONVERGED;
   if (p->reason < 0) PetscCall(NameLifted(m, &s));
   PetscCall(PetscStrncpy(p->method, o->method, sizeof(p->method)));
@@ -174,7 +176,7 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
 }
 
 /* The bound of the forces; nothing indicates errors of displacements, which are as accurate as the modes everywhere. */
-static PetscErrorCode Features(HycoROM m, PetscReal misfit[2])
+static PetscErrorCode BodiesFeatures(HycoROM m, PetscReal misfit[2])
 {
   PetscFunctionBegin;
   misfit[0] = m->prediction.interpolation_error;
@@ -185,7 +187,7 @@ static PetscErrorCode Features(HycoROM m, PetscReal misfit[2])
 
 /* The forces have the bound, displacements the error of the modes. Where nothing is interpolated, stresses in cells
    without modes have that of round-off. */
-static PetscErrorCode Estimate(HycoROM m, HycoPrediction *p)
+static PetscErrorCode BodiesEstimate(HycoROM m, HycoPrediction *p)
 {
   const HycoSubstructures b = (HycoSubstructures)m->model->data;
 
@@ -263,16 +265,16 @@ PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
                                        .work = sizeof(*(HycoBodiesWork)NULL),
                                        .resultants = PETSC_TRUE};
   static const HycoROMOps ops = {.setup = SetUp,
-                                 .reset = Reset,
-                                 .solve = Solve,
+                                 .reset = BodiesReset,
+                                 .solve = BodiesSolve,
                                  .unknowns = HycoBodiesUnknowns,
                                  .residual = HycoBodiesResidual,
                                  .jacobian = HycoBodiesJacobian,
-                                 .beside = HycoBodiesNear,
-                                 .slope = HycoBodiesSlope,
+                                 .perturbed = HycoBodiesNear,
+                                 .slope = HycoBodiesDerivatives,
                                  .expand = ExpandAll,
-                                 .features = Features,
-                                 .estimate = Estimate,
+                                 .features = BodiesFeatures,
+                                 .estimate = BodiesEstimate,
                                  .view = HycoBodiesView,
                                  .save = HycoBodiesFile,
                                  .load = HycoBodiesFile,

@@ -81,7 +81,7 @@ static PetscErrorCode MoveProbe(HycoH5 h, HycoROM m, HycoSubstructures b)
 }
 
 /* One path of a dataset at a time: `path` is overwritten by the next call. */
-static const char *At(PetscInt k, const char name[], char path[64])
+static const char *BodiesFileEntry(PetscInt k, const char name[], char path[64])
 {
   (void)snprintf(path, 64, "bodies/body_%d/%s", (int)k, name);
   return path;
@@ -95,7 +95,7 @@ static const char *AtPart(PetscInt k, const char name[], const char part[], char
 }
 
 /* The entries of a term that a file has, by columns: of a symmetric matrix the lower triangle. */
-static PetscInt Entries(const HycoFlexibility *C, PetscBool symmetric)
+static PetscInt BodiesFileEntries(const HycoFlexibility *C, PetscBool symmetric)
 {
   return symmetric ? C->n * (C->n + 1) / 2 : C->rows * C->n;
 }
@@ -107,7 +107,7 @@ static PetscInt Entries(const HycoFlexibility *C, PetscBool symmetric)
 static PetscErrorCode ReadTerms(HycoH5 h, const char model[], const char path[], PetscBool symmetric,
                                 HycoFlexibility *C, PetscInt first, PetscInt last)
 {
-  const PetscInt length = Entries(C, symmetric);
+  const PetscInt length = BodiesFileEntries(C, symmetric);
   PetscReal *row;
 
   PetscFunctionBegin;
@@ -131,7 +131,7 @@ static PetscErrorCode ReadTerms(HycoH5 h, const char model[], const char path[],
 /* Terms in double precision. */
 static PetscErrorCode WriteTerms(HycoH5 h, const char path[], PetscBool symmetric, const HycoFlexibility *C)
 {
-  const size_t length = (size_t)Entries(C, symmetric);
+  const size_t length = (size_t)BodiesFileEntries(C, symmetric);
   PetscReal *wide;
 
   PetscFunctionBegin;
@@ -147,7 +147,7 @@ static PetscErrorCode WriteTerms(HycoH5 h, const char path[], PetscBool symmetri
    not make them more accurate. */
 static PetscErrorCode WriteShortTerms(HycoH5 h, const char path[], PetscBool symmetric, const HycoFlexibility *C)
 {
-  const size_t length = (size_t)Entries(C, symmetric);
+  const size_t length = (size_t)BodiesFileEntries(C, symmetric);
   const PetscInt terms = C->n_terms - C->n_wide;
   float *narrow;
 
@@ -188,7 +188,7 @@ static PetscErrorCode MoveFlexibility(HycoH5 h, const char model[], const HycoSu
   C->n_wide = PetscMin(head[1], head[0]);
   PetscCall(HycoH5Int(h, AtPart(k, name, "terms", path), 0, s->n_samples - 1, &C->n_terms, 1, &C->term));
   if (!HycoH5Reads(h)) {
-    PetscCall(WriteTerms(h, At(k, name, path), symmetric, C));
+    PetscCall(WriteTerms(h, BodiesFileEntry(k, name, path), symmetric, C));
     PetscCall(WriteShortTerms(h, AtPart(k, name, "single", path), symmetric, C));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -196,7 +196,7 @@ static PetscErrorCode MoveFlexibility(HycoH5 h, const char model[], const HycoSu
   PetscCall(HycoFlexibilityAllocate(C));
   /* A body without a surface that may touch, or without modes: the datasets have no rows. */
   if (!C->n || !C->rows) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(ReadTerms(h, model, At(k, name, path), symmetric, C, 0, C->n_wide));
+  PetscCall(ReadTerms(h, model, BodiesFileEntry(k, name, path), symmetric, C, 0, C->n_wide));
   PetscCall(ReadTerms(h, model, AtPart(k, name, "single", path), symmetric, C, C->n_wide, C->n_terms));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -223,8 +223,8 @@ static PetscErrorCode LoadResponses(HycoH5 h, HycoSubstructure *s, PetscInt k, P
   char path[64];
 
   PetscFunctionBegin;
-  if (!HycoH5Has(h, At(k, "H", path))) {
-    PetscCall(HycoH5Real(h, At(k, "responses", path), &columns, rows, &file));
+  if (!HycoH5Has(h, BodiesFileEntry(k, "H", path))) {
+    PetscCall(HycoH5Real(h, BodiesFileEntry(k, "responses", path), &columns, rows, &file));
     PetscCall(TakeSamples(s, rows, s->n, file, &s->H));
     PetscCall(PetscFree(file));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -251,8 +251,8 @@ static PetscErrorCode LoadResponsesToLoads(HycoH5 h, HycoSubstructures b, PetscI
   char path[64];
 
   PetscFunctionBegin;
-  PetscCall(HycoH5Real(h, At(k, "a", path), &all, b->r, &a));
-  PetscCall(HycoH5Real(h, At(k, "g", path), &all, b->p, &g));
+  PetscCall(HycoH5Real(h, BodiesFileEntry(k, "a", path), &all, b->r, &a));
+  PetscCall(HycoH5Real(h, BodiesFileEntry(k, "g", path), &all, b->p, &g));
   PetscCall(PetscMalloc1((size_t)all * (size_t)n + 1, &data));
   for (PetscInt i = 0; i < all; i++) {
     PetscReal *row = data + (size_t)(i / rows) * (size_t)(n * rows) + i % rows;
@@ -275,11 +275,11 @@ static PetscErrorCode MoveMatrices(HycoH5 h, const char model[], HycoSubstructur
   s->C.rows = s->C.n = s->H.n = s->n;
   s->H.rows = s->a.rows = rows;
   s->a.n = b->r + b->p;
-  if (HycoH5Reads(h) && HycoH5Has(h, At(k, "C", path)))
+  if (HycoH5Reads(h) && HycoH5Has(h, BodiesFileEntry(k, "C", path)))
     PetscCall(LoadSamples(h, path, s));
   else
     PetscCall(MoveFlexibility(h, model, s, k, "flexibility", PETSC_TRUE, &s->C));
-  if (HycoH5Reads(h) && HycoH5Has(h, At(k, "a", path))) {
+  if (HycoH5Reads(h) && HycoH5Has(h, BodiesFileEntry(k, "a", path))) {
     PetscCall(LoadResponses(h, s, k, rows));
     PetscCall(LoadResponsesToLoads(h, b, k, rows));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -302,11 +302,11 @@ static PetscErrorCode MoveBody(HycoH5 h, const char model[], HycoSubstructures b
   s->m = b->inner_start[k + 1] - b->inner_start[k];
   rows = s->n_samples * s->n;
   columns = s->n_samples * b->p;
-  PetscCall(HycoH5Real(h, At(k, "R", path), &rows, b->r, &s->R));
-  PetscCall(HycoH5Real(h, At(k, "Z", path), &rows, b->p, &s->Z));
-  PetscCall(HycoH5Real(h, At(k, "work", path), &columns, b->r, &s->work));
+  PetscCall(HycoH5Real(h, BodiesFileEntry(k, "R", path), &rows, b->r, &s->R));
+  PetscCall(HycoH5Real(h, BodiesFileEntry(k, "Z", path), &rows, b->p, &s->Z));
+  PetscCall(HycoH5Real(h, BodiesFileEntry(k, "work", path), &columns, b->r, &s->work));
   /* r is the model's number of loads, which MoveSizes() has read. */
-  PetscCall(HycoH5Real(h, At(k, "gram", path), &b->r, b->r, &s->gram));
+  PetscCall(HycoH5Real(h, BodiesFileEntry(k, "gram", path), &b->r, b->r, &s->gram));
   PetscCall(MoveMatrices(h, model, b, k));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -96,13 +96,13 @@ PetscErrorCode HycoBodiesFrictionBegin(HycoBodiesFriction f)
   PetscCall(PetscArrayzero(f->U_old, f->normal.fe->n_dof));
   PetscCall(PetscArrayzero(f->forces, f->all.n));
   f->n_taken = 0;
-  f->present = f->loose = f->adrift = PETSC_FALSE;
+  f->present = f->loose = f->unloaded_body = PETSC_FALSE;
   HycoConeFactorForget(f->factor); /* a path does not depend on those before */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Whether M is that of the present rows and bodies, to which it belongs afterwards. */
-static PetscErrorCode Belongs(HycoBodiesFriction f, HycoBodiesWork o, PetscBool *belongs)
+static PetscErrorCode BodiesFrictionIsCurrent(HycoBodiesFriction f, HycoBodiesWork o, PetscBool *belongs)
 {
   const PetscInt n = o->bodies->n;
 
@@ -121,16 +121,17 @@ static PetscErrorCode Belongs(HycoBodiesFriction f, HycoBodiesWork o, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* W of all rows, also of open contacts, since the path keeps it for all of its steps; from the columns that are kept while
-   the rows are the same. Loads and coefficients of friction do not enter, so that it often is that of the last path. */
-static PetscErrorCode Condense(HycoBodiesFriction f, HycoBodiesWork o)
+/* W of all rows, also of open contacts, since the path keeps it for all of its steps; from the columns that are kept
+   while the rows are the same. Loads and coefficients of friction do not enter, so that it often is that of the last
+   path. */
+static PetscErrorCode BodiesFrictionCondense(HycoBodiesFriction f, HycoBodiesWork o)
 {
   const PetscInt n = f->all.n;
   PetscInt *row;
   PetscBool belongs;
 
   PetscFunctionBegin;
-  PetscCall(Belongs(f, o, &belongs));
+  PetscCall(BodiesFrictionIsCurrent(f, o, &belongs));
   f->present = PETSC_TRUE;
   if (belongs) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(f->M));
@@ -161,7 +162,7 @@ PetscErrorCode HycoBodiesFrictionPrepare(HycoBodiesFriction f, HycoBodiesWork o,
 }
 
 /* w = D - B U of the displacements found, and the residuals of the natural map at it. */
-static PetscErrorCode Measure(HycoBodiesFriction f, HycoBodiesWork o, const PetscReal L[], HycoKKT *kkt)
+static PetscErrorCode BodiesFrictionMeasure(HycoBodiesFriction f, HycoBodiesWork o, const PetscReal L[], HycoKKT *kkt)
 {
   /* Below it gaps are round-off of the coordinates. */
   PetscReal size = HYCO_NOTHING / SOLVED * HycoMeshLength(f->normal.fe->mesh), force = 0;
@@ -179,7 +180,8 @@ static PetscErrorCode Measure(HycoBodiesFriction f, HycoBodiesWork o, const Pets
     force = PetscMax(force, PetscAbsReal(L[k]));
     if (f->rows.start[k] == f->rows.start[k + 1]) continue;
     size = PetscMax(size, PetscMax(PetscAbsReal(f->rows.gap[k]), terms));
-    /* Where all contacts stick without a gap, nothing moves, and what is left is the round-off of gaps without forces. */
+    /* Where all contacts stick without a gap, nothing moves, and what is left is the round-off of gaps without
+       forces. */
     size = PetscMax(size, ROUNDED * PetscAbsReal(o->gap[k]));
   }
   f->most = 0;
@@ -204,11 +206,11 @@ static void MotionRows(HycoBodiesFriction f, PetscReal A[])
 }
 
 /* As at full order: bodies stay along motions that no contact force acts on. */
-static PetscErrorCode Stay(HycoBodiesFriction f)
+static PetscErrorCode BodiesFrictionLeastSlip(HycoBodiesFriction f)
 {
   const PetscInt n = f->all.n, p = f->p, last = (f->n_taken - 1) * (p + n);
   PetscReal *A, *w, *move, *x, *first;
-  PetscBool smooth = (PetscBool)!HycoSlipRubs(&f->slip);
+  PetscBool smooth = (PetscBool)!HycoSlipHasFriction(&f->slip);
   PetscInt loose;
 
   PetscFunctionBegin;
@@ -222,7 +224,7 @@ static PetscErrorCode Stay(HycoBodiesFriction f)
     for (PetscInt i = p; i < p + n; i++) w[i] += f->M[(size_t)k * (size_t)(p + n) + (size_t)i] * f->z[k];
   }
   for (PetscInt i = 0; i < p; i++) move[i] = f->z[i] - (f->n_taken ? f->taken[last + i] : 0);
-  PetscCall(HycoBlocksStay(f->blocks, p, A, w + p, f->z + p, move, x, &loose, first));
+  PetscCall(HycoBlocksLeastSlip(f->blocks, p, A, w + p, f->z + p, move, x, &loose, first));
   for (PetscInt i = 0; i < p; i++) f->z[i] += x[i];
   PetscCall(PetscFree5(A, w, move, x, first));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -231,8 +233,9 @@ static PetscErrorCode Stay(HycoBodiesFriction f)
 /* The problem at alpha (NULL: elastic bodies). The first start of a step is the accepted forces of the last one, not
    those of an attempt: a halved step must give what it would have given at once. `again`: at another alpha of the same
    step, from the forces found there. */
-PetscErrorCode HycoBodiesFrictionTouch(HycoBodiesFriction f, HycoBodiesWork o, PetscReal t, const PetscReal alpha[],
-                                       PetscBool again, PetscInt *its, PetscBool *solved)
+PetscErrorCode HycoBodiesFrictionSolveContact(HycoBodiesFriction f, HycoBodiesWork o, PetscReal t,
+                                              const PetscReal alpha[], PetscBool again, PetscInt *its,
+                                              PetscBool *solved)
 {
   const PetscInt n = f->all.n, p = f->p;
   HycoLCP lcp = {.n = n,
@@ -246,7 +249,7 @@ PetscErrorCode HycoBodiesFrictionTouch(HycoBodiesFriction f, HycoBodiesWork o, P
                  .given = PETSC_TRUE};
 
   PetscFunctionBegin;
-  if (!f->present) PetscCall(Condense(f, o));
+  if (!f->present) PetscCall(BodiesFrictionCondense(f, o));
   lcp.M = f->M;
   if (alpha) PetscCall(HycoBodiesStrain(o, &f->all, alpha));
   for (PetscInt i = 0; i < p; i++) f->q[i] = -HycoBodiesLoadWork(o, i);
@@ -258,7 +261,7 @@ PetscErrorCode HycoBodiesFrictionTouch(HycoBodiesFriction f, HycoBodiesWork o, P
   }
   PetscCall(HycoTaoSolveLCP(f->tao, &lcp, NULL, f->z, its, solved));
   PetscCall(HycoBlocksAdmit(f->blocks, f->z + p)); /* inadmissible by round-off; residuals are recomputed */
-  if (*solved) PetscCall(Stay(f));
+  if (*solved) PetscCall(BodiesFrictionLeastSlip(f));
   PetscCall(PetscArraycpy(o->x, f->z, p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -270,11 +273,11 @@ PetscErrorCode HycoBodiesFrictionMove(HycoBodiesFriction f, HycoBodiesWork o, Hy
   const HycoFE fe = f->normal.fe;
 
   PetscFunctionBegin;
-  HycoBodiesGiven(o, &f->all, f->z + f->p);
+  HycoBodiesDisplacementsOfForces(o, &f->all, f->z + f->p);
   PetscCall(PetscArraycpy(f->U, fe->u0, fe->n_dof));
   HycoBodiesMove(o, &f->all, f->U);
   HycoFEComplete(fe, f->U);
-  PetscCall(Measure(f, o, f->z + f->p, kkt));
+  PetscCall(BodiesFrictionMeasure(f, o, f->z + f->p, kkt));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -284,13 +287,14 @@ PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction f, HycoBodiesWork o, P
                                        PetscBool *solved)
 {
   PetscFunctionBegin;
-  PetscCall(HycoBodiesFrictionTouch(f, o, t, NULL, PETSC_FALSE, its, solved));
+  PetscCall(HycoBodiesFrictionSolveContact(f, o, t, NULL, PETSC_FALSE, its, solved));
   PetscCall(HycoBodiesFrictionMove(f, o, kkt));
   *solved = (PetscBool)(*solved && HycoKKTMax(kkt) <= SOLVED);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* w = D - B U of a step from rest, without slip before it, for any forces and alpha: what a program of the model is made of. */
+/* w = D - B U of a step from rest, without slip before it, for any forces and alpha: what a program of the model is
+   made of. */
 PetscErrorCode HycoBodiesFrictionProbe(HycoBodiesFriction f, HycoBodiesWork o, const PetscReal mu[],
                                        const PetscReal z[], PetscReal w[])
 {
@@ -361,10 +365,10 @@ PetscErrorCode HycoBodiesNameMotion(HycoBodiesWork o, const HycoBodiesSurface *s
   PetscCall(PetscCalloc3(fe->n_dof, &U, fe->n_dof, &rest, p, &x));
   PetscCall(PetscArraycpy(x, o->x, p));
   PetscCall(PetscArrayzero(o->x, p));
-  HycoBodiesGiven(o, s, L);
+  HycoBodiesDisplacementsOfForces(o, s, L);
   HycoBodiesMove(o, s, rest);
   PetscCall(PetscArraycpy(o->x, d, p));
-  HycoBodiesGiven(o, s, L);
+  HycoBodiesDisplacementsOfForces(o, s, L);
   HycoBodiesMove(o, s, U);
   PetscCall(PetscArraycpy(o->x, x, p));
   for (PetscInt i = 0; i < fe->n_dof; i++) U[i] -= rest[i];
@@ -379,21 +383,22 @@ PetscErrorCode HycoBodiesNameMotion(HycoBodiesWork o, const HycoBodiesSurface *s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoBodiesFrictionSlides(HycoBodiesFriction f, HycoBodiesWork o, char name[HYCO_LINE], PetscBool *slides)
+PetscErrorCode HycoBodiesFrictionNoEquilibrium(HycoBodiesFriction f, HycoBodiesWork o, char name[HYCO_LINE],
+                                               PetscBool *no_equilibrium)
 {
   const PetscInt n = f->all.n, p = f->p;
   PetscReal *A, *load, *r;
   PetscBool exists;
 
   PetscFunctionBegin;
-  *slides = PETSC_FALSE;
+  *no_equilibrium = PETSC_FALSE;
   if (!p) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc3(p * n, &A, p, &load, n, &r));
   for (PetscInt i = 0; i < p; i++) load[i] = -f->q[i];
   MotionRows(f, A);
   PetscCall(HycoBlocksBalance(f->blocks, p, A, load, HycoBodiesLoadRounding(o), r, &exists));
-  *slides = (PetscBool)!exists;
-  if (*slides) {
+  *no_equilibrium = (PetscBool)!exists;
+  if (*no_equilibrium) {
     PetscReal size = 0;
 
     PetscCall(HycoBlocksLeaveSlide(f->blocks, p, A, load, r));
@@ -412,8 +417,8 @@ const PetscReal *HycoBodiesFrictionForces(HycoBodiesFriction f)
   return f->z + f->p;
 }
 
-/* The rows of the contacts with a force, and Z. Exact while no contact opens, closes, or changes between stick and slip,
-   and in 2D; in 3D the direction of a slip turns. Nothing is done while the pieces are the same. */
+/* The rows of the contacts with a force, and Z. Exact while no contact opens, closes, or changes between stick and
+   slip, and in 2D; in 3D the direction of a slip turns. Nothing is done while the pieces are the same. */
 PetscErrorCode HycoBodiesFrictionDerive(HycoBodiesFriction f, PetscInt m, const PetscReal BP[], PetscBool *changed,
                                         PetscInt *n_set, PetscInt set[], PetscReal **Z, PetscBool *regular)
 {
@@ -451,10 +456,10 @@ PetscErrorCode HycoBodiesFrictionDerive(HycoBodiesFriction f, PetscInt m, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the contacts with a force, and of these the tangents that stick, leave a rigid motion free, which is named: the
-   slips of later states begin from there. Without any force bodies stay where they are, but for what loads that balance
-   themselves ask for. */
-static PetscErrorCode FindLoose(HycoBodiesFriction f, HycoBodiesWork o, PetscReal t)
+/* Whether the contacts with a force, and of these the tangents that stick, leave a rigid motion free, which is named:
+   the slips of later states begin from there. Without any force bodies stay where they are, but for what loads that
+   balance themselves ask for. */
+static PetscErrorCode FindFreeMotions(HycoBodiesFriction f, HycoBodiesWork o, PetscReal t)
 {
   const PetscInt p = f->p;
   const PetscReal *L = f->z + p;
@@ -464,11 +469,11 @@ static PetscErrorCode FindLoose(HycoBodiesFriction f, HycoBodiesWork o, PetscRea
   PetscFunctionBegin;
   if (!p) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt k = 0; k < f->slip.n; k++) most = PetscMax(most, L[f->slip.row[k]]);
-  f->adrift = (PetscBool)(!(most > 0) && (f->adrift || HycoBodiesLoaded(o)));
+  f->unloaded_body = (PetscBool)(!(most > 0) && (f->unloaded_body || HycoBodiesLoaded(o)));
   if (!(most > 0)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc2(p * f->all.n, &A, p, &first));
   MotionRows(f, A);
-  PetscCall(HycoBlocksLoose(f->blocks, p, A, L, &n, first));
+  PetscCall(HycoBlocksFreeMotions(f->blocks, p, A, L, &n, first));
   if (n && !f->loose) {
     PetscCall(HycoBodiesNameMotion(o, &f->all, L, first, f->name));
     f->at[0] = t;
@@ -479,10 +484,10 @@ static PetscErrorCode FindLoose(HycoBodiesFriction f, HycoBodiesWork o, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscBool HycoBodiesFrictionLoose(HycoBodiesFriction f, char name[HYCO_LINE])
+PetscBool HycoBodiesFrictionFreeMotion(HycoBodiesFriction f, char name[HYCO_LINE])
 {
   if (f->loose && name) HycoPathNameTimes(f->name, f->at, name);
-  return (PetscBool)(f->loose || f->adrift);
+  return (PetscBool)(f->loose || f->unloaded_body);
 }
 
 /* Slip, forces and displacements change here only, so that a halved step repeats from the same state. */
@@ -492,7 +497,7 @@ PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction f, HycoBodiesWork o, 
   const size_t n = (size_t)(f->p + f->all.n);
 
   PetscFunctionBegin;
-  PetscCall(FindLoose(f, o, t));
+  PetscCall(FindFreeMotions(f, o, t));
   if (f->n_taken == f->room) {
     f->room = 2 * f->room + 64;
     PetscCall(PetscRealloc((size_t)f->room * n * sizeof(PetscReal) + 1, &f->taken));

@@ -1,10 +1,11 @@
-/* Friction between the bodies of a model (bodies_friction.c), and the derivatives of its paths (bodies_along.c). */
+/* Friction between the bodies of a model (bodies_friction.c), and the derivatives of its paths
+   (bodies_sensitivity.c). */
 #ifndef BODIES_FRICTION_H
 #define BODIES_FRICTION_H
 
 #include "bodies_path.h"
 
-typedef struct _n_HycoBodiesAlong *HycoBodiesAlong;
+typedef struct _n_HycoBodiesSensitivity *HycoBodiesSensitivity;
 struct _n_HycoBodiesFriction {
   HycoSlip slip;
   HycoBodiesSurface normal, all; /* without and with tangents */
@@ -26,11 +27,11 @@ struct _n_HycoBodiesFriction {
   PetscReal most;                /* largest displacement */
   PetscInt n_taken, room;        /* accepted steps, and room for them */
   PetscBool loose;               /* an accepted state with forces left a motion free */
-  PetscBool adrift;              /* the last one has no forces, but loads */
+  PetscBool unloaded_body;       /* the last one has no forces, but loads */
   char name[HYCO_LINE];          /* loose: the first motion that was free, with its first and last time */
   PetscReal at[2];
-  PetscReal *taken;              /* by accepted step: p + rows, its motions and forces */
-  HycoBodiesAlong along;         /* NULL: no derivatives have been asked for; bodies_along.c frees it */
+  PetscReal *taken;            /* by accepted step: p + rows, its motions and forces */
+  HycoBodiesSensitivity along; /* NULL: no derivatives have been asked for; bodies_sensitivity.c frees it */
 };
 
 #endif

@@ -1,5 +1,5 @@
-/* The problem of the bodies' contacts for gradients: x the rigid motions, L the contact forces; w is the loads' work on the
-   motions that contact does not do, with the opposite sign, and the gaps of the displacements under z. */
+/* The problem of the bodies' contacts for gradients: x the rigid motions, L the contact forces; w is the loads' work on
+   the motions that contact does not do, with the opposite sign, and the gaps of the displacements under z. */
 #include <hycobodies.h>
 
 /* z NULL: the caller wants the sizes alone. */
@@ -60,7 +60,7 @@ PetscErrorCode HycoBodiesResidual(HycoROM m, const PetscReal mu[], const PetscRe
   PetscCall(PetscArraycpy(o->x, z, b->p));
   PetscCall(PetscArraycpy(m->Lambda, z + b->p, m->model->pairs.n));
   /* Displacements follow from forces and motions without a solve, because the flexibility is explicit. */
-  HycoBodiesGiven(o, &s, m->Lambda);
+  HycoBodiesDisplacementsOfForces(o, &s, m->Lambda);
   if (!w) PetscFunctionReturn(PETSC_SUCCESS);
   /* First the motions, then the contacts: the order of the unknowns z. */
   HycoBodiesWorkOnMotions(o, w);
@@ -80,7 +80,7 @@ PetscErrorCode HycoBodiesJacobian(HycoROM m, PetscInt k, const PetscInt contact[
 
 /* The change of the bodies' data to points beside the prediction's. All that follows from them is differentiated by the
    rules of sums and products: u = (R c - C f) / kappa + Z x is linear in each. */
-struct _n_HycoBodiesBeside {
+struct _n_HycoBodiesPerturbed {
   HycoBodiesWork at; /* the data at the last such point */
   PetscInt n_weights, size;
   PetscReal *change[5]; /* by point; 0: sums of them. c, 1 for each body's kappa, 9 for its turn, its weights,
@@ -103,9 +103,9 @@ static Parts PartsOf(const HycoBodiesWork o, const PetscReal change[])
 }
 
 /* NULL-safe. */
-PetscErrorCode HycoBodiesForgetBeside(HycoBodiesWork o)
+PetscErrorCode HycoBodiesResetPerturbed(HycoBodiesWork o)
 {
-  HycoBodiesBeside s = o->beside;
+  HycoBodiesPerturbed s = o->beside;
 
   PetscFunctionBegin;
   if (!s) PetscFunctionReturn(PETSC_SUCCESS);
@@ -116,11 +116,11 @@ PetscErrorCode HycoBodiesForgetBeside(HycoBodiesWork o)
 }
 
 /* At the first gradient of a model. */
-static PetscErrorCode MakeBeside(HycoROM m, HycoBodiesSurface s)
+static PetscErrorCode MakePerturbed(HycoROM m, HycoBodiesSurface s)
 {
   HycoBodiesWork o = (HycoBodiesWork)m->work;
   const HycoSubstructures b = o->bodies;
-  HycoBodiesBeside made;
+  HycoBodiesPerturbed made;
 
   PetscFunctionBegin;
   if (o->beside) PetscFunctionReturn(PETSC_SUCCESS);
@@ -196,7 +196,7 @@ static PetscErrorCode AddDisplacements(HycoBodiesWork o, const Parts *change, Pe
     if (AnyOf(b->body[k].n_samples, weight)) PetscCall(AddWeighted(o, k, weight, u));
   }
   for (PetscInt i = 0; i < b->ns; i++) du[i] += change->z[i];
-  PetscCall(HycoBodiesYield(o, change->f, du));
+  PetscCall(HycoBodiesAddCompliance(o, change->f, du));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -232,8 +232,8 @@ static void TakeChange(HycoBodiesWork o, PetscInt n, const PetscInt contact[], P
   }
 }
 
-/* In place of HycoBodiesResidual() at mu: w of the change of the data, to the first order. s: at mu, if its rows change;
-   gap: by row of o, where they do not. */
+/* In place of HycoBodiesResidual() at mu: w of the change of the data, to the first order. s: at mu, if its rows
+   change; gap: by row of o, where they do not. */
 PetscErrorCode HycoBodiesNearSurface(HycoROM m, const HycoBodiesSurface *s, const PetscReal gaps[],
                                      const PetscReal mu[], PetscInt n, const PetscInt contact[], PetscBool rows,
                                      const PetscReal z[], PetscInt point, PetscReal w[])
@@ -244,7 +244,7 @@ PetscErrorCode HycoBodiesNearSurface(HycoROM m, const HycoBodiesSurface *s, cons
   Parts change;
 
   PetscFunctionBegin;
-  PetscCall(MakeBeside(m, *s));
+  PetscCall(MakePerturbed(m, *s));
   at = o->beside->at;
   du = o->beside->du;
   PetscCall(HycoBodiesBring(at, rows ? s : NULL, mu));
@@ -283,8 +283,8 @@ PetscErrorCode HycoBodiesNear(HycoROM m, const PetscReal mu[], PetscInt n, const
 }
 
 /* The derivatives of the fields of body k: of the modes in its turns, and of its unknowns inside. */
-static PetscErrorCode ExpandSlope(HycoBodiesWork o, PetscInt k, const Parts *change, const PetscReal weight[],
-                                  const PetscReal dx[], PetscReal dgamma[], PetscReal inside[])
+static PetscErrorCode ExpandDerivative(HycoBodiesWork o, PetscInt k, const Parts *change, const PetscReal weight[],
+                                       const PetscReal dx[], PetscReal dgamma[], PetscReal inside[])
 {
   const HycoSubstructures b = o->bodies;
   const HycoSubstructure *own = &b->body[k];
@@ -329,7 +329,7 @@ static PetscErrorCode ExpandSlope(HycoBodiesWork o, PetscInt k, const Parts *cha
 }
 
 /* The derivatives of what inelastic strains add to the fields: the bodies that have some do not turn. */
-static void AddStrainSlopes(HycoBodiesWork o, const Parts *change, PetscReal dgamma[])
+static void AddStrainDerivatives(HycoBodiesWork o, const Parts *change, PetscReal dgamma[])
 {
   PetscReal *dalpha;
 
@@ -342,10 +342,10 @@ static void AddStrainSlopes(HycoBodiesWork o, const Parts *change, PetscReal dga
   PetscCallVoid(PetscFree(dalpha));
 }
 
-/* As HycoBodiesMove(): U' = Q u' + Q' u at the nodes with a place, where dofs are wanted; prescribed displacements are the
-   caller's. */
-static void MoveSlope(HycoBodiesWork o, const Parts *change, const PetscReal du[], const PetscBool dofs[],
-                      PetscReal dU[])
+/* As HycoBodiesMove(): U' = Q u' + Q' u at the nodes with a place, where dofs are wanted; prescribed displacements are
+   the caller's. */
+static void MoveDerivative(HycoBodiesWork o, const Parts *change, const PetscReal du[], const PetscBool dofs[],
+                           PetscReal dU[])
 {
   const PetscInt dim = o->bodies->dim;
   PetscInt last = -1;
@@ -394,7 +394,7 @@ static void FindWanted(HycoBodiesWork o, const PetscBool modes[], const PetscBoo
 static Parts SumChanges(HycoBodiesWork o, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
                         const PetscInt point[2], const PetscReal dz[])
 {
-  const HycoBodiesBeside s = o->beside;
+  const HycoBodiesPerturbed s = o->beside;
   PetscReal *sum = s->change[0], *f = sum + s->size - o->bodies->ns;
 
   for (PetscInt i = 0; i < s->size; i++)
@@ -408,9 +408,9 @@ static Parts SumChanges(HycoBodiesWork o, PetscInt n, const PetscInt contact[], 
   return PartsOf(o, sum);
 }
 
-PetscErrorCode HycoBodiesCellsSlope(HycoBodiesWork o, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
-                                    const PetscInt point[2], const PetscReal dz[], const PetscReal dalpha[],
-                                    const PetscReal u[], PetscReal du[])
+PetscErrorCode HycoBodiesCellsDerivatives(HycoBodiesWork o, PetscInt n, const PetscInt contact[],
+                                          const PetscReal weight[2], const PetscInt point[2], const PetscReal dz[],
+                                          const PetscReal dalpha[], const PetscReal u[], PetscReal du[])
 {
   const HycoSubstructures b = o->bodies;
   const HycoBodiesInelastic in = b->inelastic;
@@ -434,13 +434,13 @@ PetscErrorCode HycoBodiesCellsSlope(HycoBodiesWork o, PetscInt n, const PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoBodiesSlope(HycoROM m, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
-                               const PetscInt point[2], const PetscReal dz[], const PetscBool modes[],
-                               const PetscBool dofs[], PetscReal dgamma[], PetscReal dU[])
+PetscErrorCode HycoBodiesDerivatives(HycoROM m, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
+                                     const PetscInt point[2], const PetscReal dz[], const PetscBool modes[],
+                                     const PetscBool dofs[], PetscReal dgamma[], PetscReal dU[])
 {
   HycoBodiesWork o = (HycoBodiesWork)m->work;
   const HycoSubstructures b = o->bodies;
-  const HycoBodiesBeside s = o->beside;
+  const HycoBodiesPerturbed s = o->beside;
   const Parts change = SumChanges(o, n, contact, weight, point, dz);
   const PetscReal *of = change.weight;
   PetscReal *du = s->du;
@@ -457,10 +457,10 @@ PetscErrorCode HycoBodiesSlope(HycoROM m, PetscInt n, const PetscInt contact[], 
   PetscCall(PetscMalloc1(b->n, &wanted));
   FindWanted(o, modes, dofs, wanted);
   for (PetscInt k = 0; k < b->n; of += b->body[k++].n_samples) {
-    if (wanted[k]) PetscCall(ExpandSlope(o, k, &change, of, dz, dgamma, du + b->ns));
+    if (wanted[k]) PetscCall(ExpandDerivative(o, k, &change, of, dz, dgamma, du + b->ns));
   }
   PetscCall(PetscFree(wanted));
-  if (o->dalpha) AddStrainSlopes(o, &change, dgamma);
-  MoveSlope(o, &change, du, dofs, dU);
+  if (o->dalpha) AddStrainDerivatives(o, &change, dgamma);
+  MoveDerivative(o, &change, du, dofs, dU);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

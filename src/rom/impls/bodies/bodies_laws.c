@@ -1,13 +1,13 @@
 /*
   Derivatives of a path of bodies that deform inelastically by its parameters, step by step. A step solves r(alpha) =
-  T^T s(e) - alpha = 0, with the contact forces z(alpha) on its states. At the step's solution, with J = -dr / dalpha at the
-  laws' tangents there,
+  T^T s(e) - alpha = 0, with the contact forces z(alpha) on its states. At the step's solution, with J = -dr / dalpha at
+  the laws' tangents there,
 
       J alpha' = T^T s' + T'^T s,     z' = z'_0 + Z alpha'
 
-  where s' and z'_0 are the derivatives at the same alpha: by the data, and by the laws' states before the step, which have
-  derivatives of their own (law_slopes.c); then these states follow from alpha' and z'. On the border of yielding, or of two
-  states of a contact, the derivative serves if it stays there.
+  where s' and z'_0 are the derivatives at the same alpha: by the data, and by the laws' states before the step, which
+  have derivatives of their own (law_slopes.c); then these states follow from alpha' and z'. On the border of yielding,
+  or of two states of a contact, the derivative serves if it stays there.
 */
 #include "bodies_path.h"
 #include <hycoentries.h>
@@ -77,7 +77,7 @@ PetscErrorCode HycoBodiesLawsRecord(HycoROM m, const PetscReal alpha[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Make(HycoROM m)
+static PetscErrorCode BodiesLawsMake(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   HycoBodiesLaws o = w->laws;
@@ -104,7 +104,7 @@ static PetscErrorCode Make(HycoROM m)
 }
 
 /* Every law that deforms inelastically has derivatives by its data. */
-static PetscBool Able(HycoScene s)
+static PetscBool LawsHaveDerivatives(HycoScene s)
 {
   for (PetscInt b = 0; b < s->n_bodies; b++) {
     if (!s->body[b].law->linear && !s->body[b].law->slopes) return PETSC_FALSE;
@@ -113,7 +113,7 @@ static PetscBool Able(HycoScene s)
 }
 
 /* The forces, and what they are for other alpha. */
-static PetscErrorCode StandOnContacts(HycoROM m, PetscInt k, HycoStepAttempt *a, PetscBool *able)
+static PetscErrorCode LineariseContacts(HycoROM m, PetscInt k, HycoStepAttempt *a, PetscBool *able)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   HycoBodiesLaws o = w->laws;
@@ -121,7 +121,7 @@ static PetscErrorCode StandOnContacts(HycoROM m, PetscInt k, HycoStepAttempt *a,
 
   PetscFunctionBegin;
   if (w->friction) {
-    PetscCall(HycoBodiesAlongStand(m, w->friction, &w->bodies, k, w->n_rows ? o->alpha : NULL, able));
+    PetscCall(HycoBodiesSensitivityLinearise(m, w->friction, &w->bodies, k, w->n_rows ? o->alpha : NULL, able));
     if (*able && w->n_rows) PetscCall(HycoBodiesTakeMap(m, o->alpha, a));
   } else {
     const PetscReal *x = o->alpha + l;
@@ -130,14 +130,14 @@ static PetscErrorCode StandOnContacts(HycoROM m, PetscInt k, HycoStepAttempt *a,
     PetscCall(PetscArraycpy(w->bodies.x, x, p));
     PetscCall(PetscArraycpy(m->Lambda, x + p, w->surface.n));
     PetscCall(HycoBodiesStrain(&w->bodies, &w->surface, o->alpha));
-    HycoBodiesGiven(&w->bodies, &w->surface, m->Lambda);
+    HycoBodiesDisplacementsOfForces(&w->bodies, &w->surface, m->Lambda);
   }
   *able = (PetscBool)(*able && !a->why[0]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The laws at the step's displacements, from the state before it. */
-static PetscErrorCode StandOnLaws(HycoROM m, PetscInt k, HycoStepAttempt *a)
+static PetscErrorCode LineariseLaws(HycoROM m, PetscInt k, HycoStepAttempt *a)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   HycoBodiesLaws o = w->laws;
@@ -158,26 +158,26 @@ static PetscErrorCode StandOnLaws(HycoROM m, PetscInt k, HycoStepAttempt *a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoBodiesLawsStand(HycoROM m, PetscInt k, PetscBool *able)
+PetscErrorCode HycoBodiesLawsLinearise(HycoROM m, PetscInt k, PetscBool *able)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   HycoBodiesLaws o = w->laws;
   HycoStepAttempt a = {.why = ""};
 
   PetscFunctionBegin;
-  *able = (PetscBool)(o && o->n_taken == m->trace.n && Able(m->model->scene));
+  *able = (PetscBool)(o && o->n_taken == m->trace.n && LawsHaveDerivatives(m->model->scene));
   if (!*able || k < 0) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Make(m));
+  PetscCall(BodiesLawsMake(m));
   o->alpha = o->taken + (size_t)k * (size_t)o->width;
   w->bodies.alpha = o->alpha;
   w->bodies.dalpha = o->dalpha;
-  PetscCall(StandOnContacts(m, k, &a, able));
-  if (*able && w->n_rows) PetscCall(StandOnLaws(m, k, &a));
+  PetscCall(LineariseContacts(m, k, &a, able));
+  if (*able && w->n_rows) PetscCall(LineariseLaws(m, k, &a));
   *able = (PetscBool)(*able && !a.why[0]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoBodiesLawsRest(HycoROM m, const PetscInt **row, PetscReal w[], PetscReal *size)
+PetscErrorCode HycoBodiesLawsResidual(HycoROM m, const PetscInt **row, PetscReal w[], PetscReal *size)
 {
   HycoBodiesPath o = (HycoBodiesPath)m->work;
   const PetscInt p = o->bodies.bodies->p;
@@ -191,7 +191,7 @@ PetscErrorCode HycoBodiesLawsRest(HycoROM m, const PetscInt **row, PetscReal w[]
 }
 
 /* mu[] differs from the model's parameters by one, whose difference has this point. */
-PetscErrorCode HycoBodiesLawsBeside(HycoROM m, const PetscReal mu[], PetscInt point)
+PetscErrorCode HycoBodiesLawsPerturbed(HycoROM m, const PetscReal mu[], PetscInt point)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   HycoBodiesLaws o = w->laws;
@@ -202,29 +202,29 @@ PetscErrorCode HycoBodiesLawsBeside(HycoROM m, const PetscReal mu[], PetscInt po
   if (!w->n_rows) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt p = 0; p < m->model->scene->n_variables; p++) changed[p] = (PetscBool)(mu[p] != own[p]);
   if (!HycoFEPointsChange(o->points, changed, &strains)) {
-    PetscCall(HycoFEPointsBeside(o->points, point, PETSC_FALSE, NULL));
+    PetscCall(HycoFEPointsPerturbed(o->points, point, PETSC_FALSE, NULL));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (strains) PetscCall(HycoFESetParameters(o->fe, own));
   for (PetscInt i = 0; i < o->fe->n_dof && strains; i++) o->u[i] = w->u[i] - o->fe->u0[i];
   PetscCall(HycoFESetParameters(o->fe, mu));
   for (PetscInt i = 0; i < o->fe->n_dof && strains; i++) o->u[i] += o->fe->u0[i];
-  PetscCall(HycoFEPointsBeside(o->points, point, PETSC_TRUE, strains ? o->u : NULL));
+  PetscCall(HycoFEPointsPerturbed(o->points, point, PETSC_TRUE, strains ? o->u : NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The laws' derivatives for the motions and forces dz, and those of alpha. */
-static PetscErrorCode Follow(HycoROM m, PetscInt parameter, const PetscReal weight[3], const PetscInt point[3],
-                             const PetscReal dz[], PetscBool *smooth)
+static PetscErrorCode LawDerivativesOfMotions(HycoROM m, PetscInt parameter, const PetscReal weight[3],
+                                              const PetscInt point[3], const PetscReal dz[], PetscBool *smooth)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   HycoBodiesLaws o = w->laws;
 
   PetscFunctionBegin;
-  PetscCall(HycoBodiesCellsSlope(&w->bodies, w->surface.n, o->row, weight + 1, point + 1, dz, o->dalpha, o->cells,
-                                 o->dcells));
+  PetscCall(HycoBodiesCellsDerivatives(&w->bodies, w->surface.n, o->row, weight + 1, point + 1, dz, o->dalpha, o->cells,
+                                       o->dcells));
   for (PetscInt i = 0; i < w->bodies.bodies->inelastic->nd; i++) o->du[w->at[i]] = o->dcells[i];
-  PetscCall(HycoFEPointsSlope(o->points, parameter, weight, point, o->du, o->ds, NULL, smooth));
+  PetscCall(HycoFEPointsDerivatives(o->points, parameter, weight, point, o->du, o->ds, NULL, smooth));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -238,7 +238,7 @@ static PetscErrorCode SolveStrains(HycoROM m, const PetscReal weight[3], const P
                   of = m->fe->dim == 3 || m->fe->formulation == HYCO_AXISYMMETRIC ? 3 : 2;
 
   PetscFunctionBegin;
-  HycoFEPointsWeightSlope(o->points, weight, point, o->weight);
+  HycoFEPointsWeightDerivatives(o->points, weight, point, o->weight);
   PetscCall(PetscArrayzero(o->dalpha, l));
   for (PetscInt i = 0; i < w->n_rows; i++) {
     /* T follows the size of its point, w^((of - 1) / of) (bodies_newton.c). */
@@ -261,7 +261,7 @@ static void AddStrains(HycoBodiesPath w, PetscReal q[])
 }
 
 /* Whether contacts without force and gap stay so, for the change q of the gaps at fixed forces, and dz. */
-static PetscBool Stays(HycoROM m, const PetscReal q[], const PetscReal dz[])
+static PetscBool BodiesLawsStateStays(HycoROM m, const PetscReal q[], const PetscReal dz[])
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   HycoBodiesLaws o = w->laws;
@@ -287,8 +287,9 @@ static PetscBool Stays(HycoROM m, const PetscReal q[], const PetscReal dz[])
 }
 
 /* dz on the contacts' states for the change q of the gaps at fixed forces and alpha. */
-static PetscErrorCode Respond(HycoROM m, PetscInt parameter, const PetscReal weight[3], const PetscInt point[3],
-                              const PetscReal q[], PetscReal dz[], PetscBool *regular)
+static PetscErrorCode BodiesLawsRespond(HycoROM m, PetscInt parameter, const PetscReal weight[3],
+                                        const PetscInt point[3], const PetscReal q[], PetscReal dz[],
+                                        PetscBool *regular)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const PetscInt N = w->bodies.bodies->p + w->surface.n;
@@ -296,7 +297,7 @@ static PetscErrorCode Respond(HycoROM m, PetscInt parameter, const PetscReal wei
 
   PetscFunctionBegin;
   if (w->friction) {
-    PetscCall(HycoBodiesAlongStep(w->friction, parameter, weight, point, q, dz, regular));
+    PetscCall(HycoBodiesSensitivityAdvance(w->friction, parameter, weight, point, q, dz, regular));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   for (PetscInt i = 0; i < N && w->bodies.bodies->p; i++) any = (PetscBool)(any || q[i] != 0);
@@ -306,8 +307,9 @@ static PetscErrorCode Respond(HycoROM m, PetscInt parameter, const PetscReal wei
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoBodiesLawsAlong(HycoROM m, PetscInt parameter, const PetscReal weight[3], const PetscInt point[3],
-                                   const PetscReal q[], PetscReal dz[], PetscBool *regular)
+PetscErrorCode HycoBodiesLawsSensitivity(HycoROM m, PetscInt parameter, const PetscReal weight[3],
+                                         const PetscInt point[3], const PetscReal q[], PetscReal dz[],
+                                         PetscBool *regular)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   HycoBodiesLaws o = w->laws;
@@ -317,27 +319,27 @@ PetscErrorCode HycoBodiesLawsAlong(HycoROM m, PetscInt parameter, const PetscRea
   PetscCall(PetscArrayzero(o->dalpha, w->bodies.bodies->inelastic->m));
   PetscCall(PetscArraycpy(o->q, q, w->bodies.bodies->p + w->surface.n));
   /* Whether the contacts keep their states is not yet known. */
-  PetscCall(Respond(m, parameter, weight, point, o->q, dz, regular));
+  PetscCall(BodiesLawsRespond(m, parameter, weight, point, o->q, dz, regular));
   if (w->n_rows && (*regular || w->friction)) {
     /* Beside the step it was elsewhere. */
     PetscCall(HycoFESetParameters(o->fe, w->bodies.mu));
     PetscCall(HycoFEKeepGradients(o->fe));
-    PetscCall(Follow(m, parameter, weight, point, dz, &smooth));
+    PetscCall(LawDerivativesOfMotions(m, parameter, weight, point, dz, &smooth));
     PetscCall(SolveStrains(m, weight, point));
     AddStrains(w, o->q);
-    PetscCall(Respond(m, parameter, weight, point, o->q, dz, regular));
-    PetscCall(Follow(m, parameter, weight, point, dz, &smooth));
+    PetscCall(BodiesLawsRespond(m, parameter, weight, point, o->q, dz, regular));
+    PetscCall(LawDerivativesOfMotions(m, parameter, weight, point, dz, &smooth));
   }
   *regular = (PetscBool)(*regular && smooth);
   if (*regular && w->friction)
-    HycoBodiesAlongTake(w->friction, parameter, dz);
+    HycoBodiesSensitivityAccept(w->friction, parameter, dz);
   else if (*regular)
-    *regular = Stays(m, o->q, dz);
+    *regular = BodiesLawsStateStays(m, o->q, dz);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After HycoBodiesLawsAlong(): the displacements of the points' cells are not those of the modes. */
-void HycoBodiesLawsSlope(HycoROM m, PetscReal dU[])
+/* After HycoBodiesLawsSensitivity(): the displacements of the points' cells are not those of the modes. */
+void HycoBodiesLawsDerivatives(HycoROM m, PetscReal dU[])
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
 

@@ -31,7 +31,7 @@ void HycoBodiesRigidRow(HycoSubstructures b, PetscInt k, const PetscReal X[3], P
 }
 
 /* The centres of the nodes of the body's cell, at its reference and now. */
-static void Centres(HycoBodiesWork o, PetscInt k, PetscReal before[3], PetscReal now[3])
+static void BodiesMotionsCentres(HycoBodiesWork o, PetscInt k, PetscReal before[3], PetscReal now[3])
 {
   HycoMesh m = o->bodies->probe;
   const PetscInt e = o->bodies->cell[k];
@@ -50,7 +50,7 @@ static void PlaceMotions(HycoBodiesWork o, const HycoBodiesSurface *s, PetscInt 
   const HycoPose *pose = &o->pose[k];
   PetscReal before[3], now[3];
 
-  Centres(o, k, before, now);
+  BodiesMotionsCentres(o, k, before, now);
   for (PetscInt i = 0; i < o->n_placed; i++) {
     const PetscInt *loc = o->loc + o->placed[i] * b->dim;
     PetscReal from[3], X[3] = {0, 0, 0}, row[6];

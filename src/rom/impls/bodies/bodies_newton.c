@@ -9,19 +9,19 @@
 
       r(alpha) = T^T s(e_0 + S alpha) - alpha = 0,      dr/dalpha = sum over points of T_p^T (C - C_t) S_p - 1
 
-  with what their stresses lack of the elastic ones, s = C (e - e_th) - sigma. It is solved by Newton's method; its tangent
-  is kept while it contracts, also from step to step. Then the set is checked: forces, and gaps of all contacts; if one is
-  violated, the contact problem at alpha gives the next set. The set of a step is the first one of the next.
+  with what their stresses lack of the elastic ones, s = C (e - e_th) - sigma. It is solved by Newton's method; its
+  tangent is kept while it contracts, also from step to step. Then the set is checked: forces, and gaps of all contacts;
+  if one is violated, the contact problem at alpha gives the next set. The set of a step is the first one of the next.
 
   Rigid motions x that contact alone prevents do not strain the points. On a set, with G = B Z of the motions and f the
   work of the loads on them, W_aa L - G x = B P alpha - w and G^T L = f. W_aa is factored with rho G G^T added, which
   keeps L and moves x by rho f: alone it may be singular where the pins of a body's flexibility are.
 
   With friction the forces are those of the contact problem at alpha (bodies_friction.c), L(alpha), and the set is their
-  linear map L_k + Z (alpha - alpha_k) on the states found there: which contacts are open, stick or slip. A round is the same
-  small problem on that map, then the contact problem at the new alpha; it was the last one if the forces are those of the
-  map. Where no state changes, and in 2D, the map is exact, and most steps take one round; in 3D the directions of slip turn,
-  and rounds are a Newton's method. States that change in every round end the step, which is halved.
+  linear map L_k + Z (alpha - alpha_k) on the states found there: which contacts are open, stick or slip. A round is the
+  same small problem on that map, then the contact problem at the new alpha; it was the last one if the forces are those
+  of the map. Where no state changes, and in 2D, the map is exact, and most steps take one round; in 3D the directions
+  of slip turn, and rounds are a Newton's method. States that change in every round end the step, which is halved.
 */
 #include "bodies_path.h"
 
@@ -35,8 +35,8 @@
 
 /* y = beta y + factor A x of a table by rows, n x l; transposed: A^T x. BLAS sees a table by rows as its transpose by
    columns, hence the exchanged letters. */
-static PetscErrorCode Multiply(PetscBool transposed, PetscInt n, PetscInt l, const PetscReal A[], const PetscReal x[],
-                               PetscReal factor, PetscReal beta, PetscReal y[])
+static PetscErrorCode BodiesNewtonMultiply(PetscBool transposed, PetscInt n, PetscInt l, const PetscReal A[],
+                                           const PetscReal x[], PetscReal factor, PetscReal beta, PetscReal y[])
 {
   PetscBLASInt rows, columns, each = 1;
 
@@ -71,7 +71,7 @@ PetscErrorCode HycoBodiesForget(HycoROM m)
 }
 
 /* The displacements of the surfaces by a unit force at contact k, y. */
-static void Push(HycoBodiesWork o, PetscInt k, PetscReal y[])
+static void BodiesNewtonStore(HycoBodiesWork o, PetscInt k, PetscReal y[])
 {
   const HycoSubstructures b = o->bodies;
 
@@ -110,7 +110,7 @@ static void TakeStrains(HycoROM m, PetscInt k, const PetscReal cells[], PetscRea
 
 /* The column of contact k, if it is not there. On demand: only contacts that enter the set at some time need one, and
    each costs a response of the bodies. */
-static PetscErrorCode Column(HycoROM m, PetscInt k)
+static PetscErrorCode BodiesNewtonColumn(HycoROM m, PetscInt k)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const HycoBodiesWork o = &w->bodies;
@@ -125,7 +125,7 @@ static PetscErrorCode Column(HycoROM m, PetscInt k)
      displacements of their cells. */
   PetscCall(PetscCalloc1(n + w->n_rows + in->nd + 1, &w->column[k]));
   PetscCall(PetscMalloc1(b->ns + 1, &y));
-  if (n) Push(o, k, y);
+  if (n) BodiesNewtonStore(o, k, y);
   for (PetscInt j = 0; j < n; j++) {
     for (PetscInt e = o->row_start[j]; e < o->row_start[j + 1]; e++) w->column[k][j] -= o->row[e] * y[o->row_at[e]];
   }
@@ -141,8 +141,8 @@ static PetscErrorCode Column(HycoROM m, PetscInt k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* B at fe's nodes, and T and the modes there: what a stress does at the nodes follows the body's size, w B, and the modes'
-   displacements are those of forces at the first one. */
+/* B at fe's nodes, and T and the modes there: what a stress does at the nodes follows the body's size, w B, and the
+   modes' displacements are those of forces at the first one. */
 static PetscErrorCode TakePoints(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -272,7 +272,7 @@ static PetscErrorCode FactorEach(HycoROM m)
 }
 
 /* The fast LAPACK factor first: dependent contacts (equal rows of B, as at shared corners) are rare. */
-static PetscErrorCode Factor(HycoROM m)
+static PetscErrorCode BodiesNewtonFactor(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   PetscBool independent = PETSC_FALSE;
@@ -281,7 +281,7 @@ static PetscErrorCode Factor(HycoROM m)
   PetscCall(PetscFree(w->U));
   PetscCall(PetscMalloc1((size_t)w->n_set * (size_t)w->n_set + 1, &w->U));
   /* Columns are kept for the path: a contact that closes again costs nothing. */
-  for (PetscInt k = 0; k < w->n_set; k++) PetscCall(Column(m, w->set[k]));
+  for (PetscInt k = 0; k < w->n_set; k++) PetscCall(BodiesNewtonColumn(m, w->set[k]));
   WeighMotions(w, w->bodies.bodies->p);
   PetscCall(FactorAll(m, &independent));
   if (!independent) PetscCall(FactorEach(m));
@@ -302,8 +302,8 @@ static void SolveOnSet(const HycoBodiesPath w, PetscInt k, PetscReal X[])
   BLAStrsm_("R", "U", "T", "N", &columns, &n, &one, w->U, &n, X, &columns);
 }
 
-/* Y = W_aa^-1 G, and G^T Y, whose size is p: W_aa^-1 is positive definite, so that it is singular only where the set does
-   not determine a motion. */
+/* Y = W_aa^-1 G, and G^T Y, whose size is p: W_aa^-1 is positive definite, so that it is singular only where the set
+   does not determine a motion. */
 static PetscErrorCode TakeMotions(HycoBodiesPath w, PetscInt p)
 {
   PetscBool regular;
@@ -328,8 +328,8 @@ static PetscErrorCode TakeMotions(HycoBodiesPath w, PetscInt p)
 }
 
 /* The forces X = W_aa^-1 (given), n_set x k, and the motions x, p x k, with G^T X = work (k = 1), or 0 (NULL). */
-static PetscErrorCode Balance(HycoBodiesPath w, PetscInt p, PetscInt k, const PetscReal work[], PetscReal X[],
-                              PetscReal x[])
+static PetscErrorCode BodiesNewtonBalance(HycoBodiesPath w, PetscInt p, PetscInt k, const PetscReal work[],
+                                          PetscReal X[], PetscReal x[])
 {
   PetscBLASInt n, columns, info;
   PetscReal *right;
@@ -382,7 +382,7 @@ static PetscErrorCode AddForces(const HycoBodiesPath w, PetscInt l)
 static PetscErrorCode AddStrains(HycoBodiesPath w, PetscInt l, const PetscReal alpha[])
 {
   PetscFunctionBegin;
-  PetscCall(Multiply(PETSC_FALSE, w->n_rows, l, w->summed ? w->S : w->response, alpha, 1, 1, w->e));
+  PetscCall(BodiesNewtonMultiply(PETSC_FALSE, w->n_rows, l, w->summed ? w->S : w->response, alpha, 1, 1, w->e));
   for (PetscInt i = 0; i < w->n_set && !w->summed; i++) {
     PetscReal force = 0;
 
@@ -400,13 +400,13 @@ static PetscErrorCode TakeSet(HycoROM m)
 
   PetscFunctionBegin;
   w->factored = PETSC_FALSE;
-  PetscCall(Factor(m));
+  PetscCall(BodiesNewtonFactor(m));
   PetscCall(PetscFree(w->Z));
   PetscCall(PetscMalloc1(w->n_set * l + 1, &w->Z));
   /* L = W_aa^-1 (B P alpha - w): Z is its derivative by alpha. */
   for (PetscInt i = 0; i < w->n_set; i++) PetscCall(PetscArraycpy(w->Z + i * l, w->BP + w->set[i] * l, l));
   PetscCall(TakeMotions(w, w->bodies.bodies->p));
-  PetscCall(Balance(w, w->bodies.bodies->p, l, NULL, w->Z, w->x));
+  PetscCall(BodiesNewtonBalance(w, w->bodies.bodies->p, l, NULL, w->Z, w->x));
   w->summed = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -422,10 +422,10 @@ PetscErrorCode HycoBodiesMoveCells(HycoROM m, const PetscReal alpha[], const Pet
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(in->nd + 1, &cells));
-  PetscCall(Multiply(PETSC_FALSE, in->nd, b->r, in->R, w->bodies.c, 1, 1, cells));
-  PetscCall(Multiply(PETSC_FALSE, in->nd, in->m, in->A, alpha, 1, 1, cells));
+  PetscCall(BodiesNewtonMultiply(PETSC_FALSE, in->nd, b->r, in->R, w->bodies.c, 1, 1, cells));
+  PetscCall(BodiesNewtonMultiply(PETSC_FALSE, in->nd, in->m, in->A, alpha, 1, 1, cells));
   for (PetscInt i = 0; i < in->nd; i++) cells[i] /= w->bodies.kappa[in->body[i]];
-  PetscCall(Multiply(PETSC_FALSE, in->nd, b->p, in->Z, w->bodies.x, 1, 1, cells));
+  PetscCall(BodiesNewtonMultiply(PETSC_FALSE, in->nd, b->p, in->Z, w->bodies.x, 1, 1, cells));
   for (PetscInt i = 0; i < w->n_set; i++) {
     HycoBodiesAdd(in->nd, Lambda[w->set[i]], w->column[w->set[i]] + w->gaps + w->n_rows, cells);
   }
@@ -445,7 +445,7 @@ PetscErrorCode HycoBodiesProbeCells(HycoROM m, const PetscReal alpha[], const Pe
   w->n_set = 0;
   for (PetscInt k = 0; k < w->surface.n; k++) {
     if (Lambda[k] == 0) continue;
-    PetscCall(Column(m, k));
+    PetscCall(BodiesNewtonColumn(m, k));
     w->set[w->n_set++] = k;
   }
   PetscCall(HycoBodiesMoveCells(m, alpha, Lambda));
@@ -476,7 +476,7 @@ static PetscErrorCode TakeStrainsOfLoads(HycoROM m)
 
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(w->e0, w->n_rows));
-  PetscCall(Multiply(PETSC_FALSE, w->n_rows, o->bodies->r, w->loads, o->c, 1, 0, w->e0));
+  PetscCall(BodiesNewtonMultiply(PETSC_FALSE, w->n_rows, o->bodies->r, w->loads, o->c, 1, 0, w->e0));
   AddSupports(m, w->e0);
   for (PetscInt k = 0; k < w->n_set; k++) HycoBodiesAdd(w->n_rows, w->z[k], w->column[w->set[k]] + w->gaps, w->e0);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -499,7 +499,7 @@ static PetscErrorCode TakeLoads(HycoROM m)
   for (PetscInt i = 0; i < w->n_set; i++) w->z[i] = -o->gap[w->set[i]];
   PetscCall(PetscCalloc1(p + 1, &work));
   for (PetscInt i = 0; i < p; i++) work[i] = HycoBodiesLoadWork(o, i);
-  PetscCall(Balance(w, p, 1, work, w->z, w->x0));
+  PetscCall(BodiesNewtonBalance(w, p, 1, work, w->z, w->x0));
   PetscCall(PetscFree(work));
   PetscCall(TakeStrainsOfLoads(m));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -528,7 +528,7 @@ static PetscErrorCode ChooseSet(HycoROM m, const PetscReal Lambda[], PetscBool *
 }
 
 /* The forces on the set and the rigid motions, and whether a condition is violated. */
-static PetscErrorCode Check(HycoROM m, const PetscReal alpha[], PetscReal Lambda[], PetscBool *violated)
+static PetscErrorCode BodiesNewtonCheck(HycoROM m, const PetscReal alpha[], PetscReal Lambda[], PetscBool *violated)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const HycoBodiesWork o = &w->bodies;
@@ -539,7 +539,7 @@ static PetscErrorCode Check(HycoROM m, const PetscReal alpha[], PetscReal Lambda
   *violated = PETSC_FALSE;
   PetscCall(PetscArrayzero(Lambda, w->surface.n));
   PetscCall(PetscArraycpy(o->gap, w->gap, w->surface.n)); /* gap -= B P alpha */
-  PetscCall(Multiply(PETSC_FALSE, w->surface.n, l, w->BP, alpha, -1, 1, o->gap));
+  PetscCall(BodiesNewtonMultiply(PETSC_FALSE, w->surface.n, l, w->BP, alpha, -1, 1, o->gap));
   /* The forces are affine in alpha, as the strains are: no solve. */
   for (PetscInt i = 0; i < w->n_set; i++) {
     PetscReal *force = &Lambda[w->set[i]];
@@ -556,7 +556,7 @@ static PetscErrorCode Check(HycoROM m, const PetscReal alpha[], PetscReal Lambda
     o->x[d] = w->x0[d];
     for (PetscInt k = 0; k < l; k++) o->x[d] += w->x[d * l + k] * alpha[k];
   }
-  PetscCall(Multiply(PETSC_FALSE, w->surface.n, p, w->G, o->x, -1, 1, o->gap));
+  PetscCall(BodiesNewtonMultiply(PETSC_FALSE, w->surface.n, p, w->G, o->x, -1, 1, o->gap));
   for (PetscInt k = 0; k < w->surface.n; k++) {
     PetscReal gap = o->gap[k];
 
@@ -574,8 +574,8 @@ static PetscErrorCode Check(HycoROM m, const PetscReal alpha[], PetscReal Lambda
 /* -- Newton's method on a set -- */
 
 /* The laws at alpha: s, r = T^T s - alpha, and its size. */
-static PetscErrorCode Evaluate(HycoROM m, PetscReal t0, PetscReal t1, const PetscReal alpha[], PetscBool tangent,
-                               HycoStepAttempt *a)
+static PetscErrorCode BodiesNewtonEvaluate(HycoROM m, PetscReal t0, PetscReal t1, const PetscReal alpha[],
+                                           PetscBool tangent, HycoStepAttempt *a)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   HycoBodiesInelastic in = w->bodies.bodies->inelastic;
@@ -591,7 +591,7 @@ static PetscErrorCode Evaluate(HycoROM m, PetscReal t0, PetscReal t1, const Pets
   a->seconds_law += HycoNow() - begin;
   if (a->law.failed) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscArrayzero(w->r, in->m));
-  PetscCall(Multiply(PETSC_TRUE, w->n_rows, in->m, w->T, w->s, 1, 0, w->r));
+  PetscCall(BodiesNewtonMultiply(PETSC_TRUE, w->n_rows, in->m, w->T, w->s, 1, 0, w->r));
   for (PetscInt p = 0; p < in->n_points; p++) terms += PetscSqr(w->weight[p] * w->size[p]);
   for (PetscInt k = 0; k < in->m; k++) {
     sum[0] += PetscSqr(w->r[k]);
@@ -652,14 +652,14 @@ PetscErrorCode HycoBodiesSolveTangent(HycoBodiesPath w, PetscReal x[])
 }
 
 /* alpha += J^-1 r */
-static PetscErrorCode Advance(HycoROM m, PetscReal alpha[], HycoStepAttempt *a)
+static PetscErrorCode BodiesNewtonAdvance(HycoROM m, PetscReal alpha[], HycoStepAttempt *a)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const PetscInt l = w->bodies.bodies->inelastic->m;
 
   PetscFunctionBegin;
   if (a->why[0]) PetscFunctionReturn(PETSC_SUCCESS);
-  /* r becomes the step, so that Evaluate() must run before the next one. */
+  /* r becomes the step, so that BodiesNewtonEvaluate() must run before the next one. */
   PetscCall(HycoBodiesSolveTangent(w, w->r));
   for (PetscInt k = 0; k < l; k++) alpha[k] += w->r[k];
   a->iterations++;
@@ -680,7 +680,7 @@ static PetscErrorCode EvaluateOrRenew(HycoROM m, PetscReal t0, PetscReal t1, con
   for (int pass = 0; pass < 2 && !a->law.failed; pass++) {
     PetscReal norm = 0;
 
-    PetscCall(Evaluate(m, t0, t1, alpha, tangent, a));
+    PetscCall(BodiesNewtonEvaluate(m, t0, t1, alpha, tangent, a));
     for (PetscInt i = 0; i < l; i++) norm += PetscSqr(w->r[i]);
     norm = PetscSqrtReal(norm);
     /* At most two passes: the second has the tangent and is always accepted. */
@@ -695,7 +695,8 @@ static PetscErrorCode EvaluateOrRenew(HycoROM m, PetscReal t0, PetscReal t1, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Evaluates at alpha; with the tangent of each iteration the step from `last` is halved while r is larger than before. */
+/* Evaluates at alpha; with the tangent of each iteration the step from `last` is halved while r is larger than
+   before. */
 static PetscErrorCode EvaluateStep(HycoROM m, PetscReal t0, PetscReal t1, PetscReal alpha[], const PetscReal last[],
                                    PetscReal *norm, HycoStepAttempt *a)
 {
@@ -715,7 +716,7 @@ static PetscErrorCode EvaluateStep(HycoROM m, PetscReal t0, PetscReal t1, PetscR
 
 /* Solves r = 0 on the set; else a->why. Convergence is judged relative to the size of the strains, w->norm, and to a
    floor below which all is round-off. */
-static PetscErrorCode Newton(HycoROM m, PetscReal t0, PetscReal t1, PetscReal alpha[], HycoStepAttempt *a)
+static PetscErrorCode BodiesNewtonSolve(HycoROM m, PetscReal t0, PetscReal t1, PetscReal alpha[], HycoStepAttempt *a)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   /* Of each set or map: how many a step has is a matter of its rounds. */
@@ -740,7 +741,7 @@ static PetscErrorCode Newton(HycoROM m, PetscReal t0, PetscReal t1, PetscReal al
       break;
     }
     PetscCall(PetscArraycpy(last, alpha, w->bodies.bodies->inelastic->m));
-    PetscCall(Advance(m, alpha, a));
+    PetscCall(BodiesNewtonAdvance(m, alpha, a));
   }
   PetscCall(PetscFree(last));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -749,7 +750,7 @@ static PetscErrorCode Newton(HycoROM m, PetscReal t0, PetscReal t1, PetscReal al
 /* -- sets -- */
 
 /* Without a force there is no set to begin with, as in the first step of a path or after a contact has opened. */
-static PetscBool Presses(HycoROM m, const PetscReal Lambda[])
+static PetscBool BodiesNewtonHasForce(HycoROM m, const PetscReal Lambda[])
 {
   const HycoBodiesPath w = (HycoBodiesPath)m->work;
 
@@ -760,7 +761,7 @@ static PetscBool Presses(HycoROM m, const PetscReal Lambda[])
 }
 
 /* The forces of the contact problem at alpha. */
-static PetscErrorCode Contacts(HycoROM m, const PetscReal alpha[], PetscReal Lambda[], HycoStepAttempt *a)
+static PetscErrorCode BodiesNewtonContacts(HycoROM m, const PetscReal alpha[], PetscReal Lambda[], HycoStepAttempt *a)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   PetscBool solved;
@@ -776,15 +777,15 @@ static PetscErrorCode Contacts(HycoROM m, const PetscReal alpha[], PetscReal Lam
 
 /* The set of these forces; or of the contact problem's, if it does not determine the rigid motions. Without any closed
    contact these are those of the contact problem, and no load acts on them. */
-static PetscErrorCode Choose(HycoROM m, const PetscReal alpha[], PetscReal Lambda[], PetscBool *same,
-                             HycoStepAttempt *a)
+static PetscErrorCode BodiesNewtonChoose(HycoROM m, const PetscReal alpha[], PetscReal Lambda[], PetscBool *same,
+                                         HycoStepAttempt *a)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
 
   PetscFunctionBegin;
   PetscCall(ChooseSet(m, Lambda, same));
   if (!w->loose || !w->n_set || a->why[0]) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Contacts(m, alpha, Lambda, a));
+  PetscCall(BodiesNewtonContacts(m, alpha, Lambda, a));
   PetscCall(ChooseSet(m, Lambda, same));
   if (w->loose && w->n_set && !a->why[0])
     HycoFormat(a->why, "the closed contacts do not determine the motion of a body that contact alone holds");
@@ -794,7 +795,7 @@ static PetscErrorCode Choose(HycoROM m, const PetscReal alpha[], PetscReal Lambd
 /* -- friction -- */
 
 /* Force i of the set by the linear map. */
-static PetscReal Mapped(const HycoBodiesPath w, PetscInt l, PetscInt i, const PetscReal alpha[])
+static PetscReal BodiesNewtonMapped(const HycoBodiesPath w, PetscInt l, PetscInt i, const PetscReal alpha[])
 {
   PetscReal force = w->z[i];
 
@@ -818,20 +819,20 @@ static PetscErrorCode TakeStates(HycoROM m, const PetscReal alpha[], HycoStepAtt
   if (changed) {
     /* The tangent of other states stays while it contracts, like that of other strains. */
     w->summed = PETSC_FALSE;
-    for (PetscInt k = 0; k < w->n_set; k++) PetscCall(Column(m, w->set[k]));
+    for (PetscInt k = 0; k < w->n_set; k++) PetscCall(BodiesNewtonColumn(m, w->set[k]));
     PetscCall(PetscFree(w->z));
     PetscCall(PetscMalloc1(w->n_set + 1, &w->z));
   }
   for (PetscInt i = 0; i < w->n_set; i++) {
     w->z[i] = 0;
-    w->z[i] = L[w->set[i]] - Mapped(w, l, i, alpha);
+    w->z[i] = L[w->set[i]] - BodiesNewtonMapped(w, l, i, alpha);
   }
   PetscCall(TakeStrainsOfLoads(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Whether the forces at alpha are those of the linear map. */
-static PetscBool Agrees(HycoROM m, const PetscReal alpha[])
+static PetscBool BodiesNewtonMapAgrees(HycoROM m, const PetscReal alpha[])
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const PetscReal *L = HycoBodiesFrictionForces(w->friction);
@@ -841,7 +842,7 @@ static PetscBool Agrees(HycoROM m, const PetscReal alpha[])
   for (PetscInt k = 0; k < w->surface.n; k++) {
     PetscReal force = 0;
 
-    if (i < w->n_set && w->set[i] == k) force = Mapped(w, w->bodies.bodies->inelastic->m, i++, alpha);
+    if (i < w->n_set && w->set[i] == k) force = BodiesNewtonMapped(w, w->bodies.bodies->inelastic->m, i++, alpha);
     most = PetscMax(most, PetscAbsReal(L[k]));
     apart = PetscMax(apart, PetscAbsReal(L[k] - force));
   }
@@ -849,22 +850,24 @@ static PetscBool Agrees(HycoROM m, const PetscReal alpha[])
 }
 
 /* The contact problem at alpha. */
-static PetscErrorCode Touch(HycoROM m, PetscReal t1, const PetscReal alpha[], PetscBool again, HycoStepAttempt *a)
+static PetscErrorCode BodiesNewtonSolveContact(HycoROM m, PetscReal t1, const PetscReal alpha[], PetscBool again,
+                                               HycoStepAttempt *a)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  PetscBool solved, slides = PETSC_FALSE;
+  PetscBool solved, no_equilibrium = PETSC_FALSE;
   PetscInt its;
   char name[HYCO_LINE] = "";
 
   PetscFunctionBegin;
-  PetscCall(HycoBodiesFrictionTouch(w->friction, &w->bodies, t1, w->n_rows ? alpha : NULL, again, &its, &solved));
+  PetscCall(
+      HycoBodiesFrictionSolveContact(w->friction, &w->bodies, t1, w->n_rows ? alpha : NULL, again, &its, &solved));
   a->active_its += its;
   if (!solved) HycoFormat(a->why, "not converged: no contact forces with this friction balance the load");
-  if (!solved) PetscCall(HycoBodiesFrictionSlides(w->friction, &w->bodies, name, &slides));
-  if (slides)
-    HycoFormat(w->path->slides, "%s%s%s", a->why,
+  if (!solved) PetscCall(HycoBodiesFrictionNoEquilibrium(w->friction, &w->bodies, name, &no_equilibrium));
+  if (no_equilibrium)
+    HycoFormat(w->path->no_equilibrium, "%s%s%s", a->why,
                name[0] ? "; no support keeps " : "; a body that contact alone holds slides away", name);
-  if (!solved && w->path->slides[0]) HycoFormat(a->why, "%s", w->path->slides);
+  if (!solved && w->path->no_equilibrium[0]) HycoFormat(a->why, "%s", w->path->no_equilibrium);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -875,7 +878,7 @@ static PetscErrorCode SearchStates(HycoROM m, PetscReal t0, PetscReal t1, PetscR
   PetscBool done = (PetscBool)!w->n_rows;
 
   PetscFunctionBegin;
-  PetscCall(Touch(m, t1, alpha, PETSC_FALSE, a));
+  PetscCall(BodiesNewtonSolveContact(m, t1, alpha, PETSC_FALSE, a));
   if (done) a->iterations = 1;
   for (PetscInt round = 0; !done && round < ROUNDS && !a->why[0]; round++) {
     const PetscInt before = a->iterations;
@@ -883,12 +886,12 @@ static PetscErrorCode SearchStates(HycoROM m, PetscReal t0, PetscReal t1, PetscR
     /* A map that is kept converges in few rounds, or is made again. */
     if (round >= KEPT) w->fresh = PETSC_TRUE;
     PetscCall(TakeStates(m, alpha, a));
-    if (!a->why[0]) PetscCall(Newton(m, t0, t1, alpha, a));
+    if (!a->why[0]) PetscCall(BodiesNewtonSolve(m, t0, t1, alpha, a));
     /* alpha is that of the contact problem. */
     done = (PetscBool)(a->iterations == before);
     if (done || a->why[0]) break;
-    PetscCall(Touch(m, t1, alpha, PETSC_TRUE, a));
-    done = Agrees(m, alpha);
+    PetscCall(BodiesNewtonSolveContact(m, t1, alpha, PETSC_TRUE, a));
+    done = BodiesNewtonMapAgrees(m, alpha);
   }
   if (!done && !a->why[0]) HycoFormat(a->why, "contacts stick and slip in turn");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -923,7 +926,7 @@ PetscErrorCode HycoBodiesMoveSet(HycoBodiesPath w, const PetscReal q[], PetscRea
   PetscCall(PetscMalloc2(w->n_set + 1, &force, p + 1, &work));
   for (PetscInt i = 0; i < w->n_set; i++) force[i] = -q[p + w->set[i]];
   for (PetscInt d = 0; d < p; d++) work[d] = -q[d];
-  PetscCall(Balance(w, p, 1, work, force, dz));
+  PetscCall(BodiesNewtonBalance(w, p, 1, work, force, dz));
   for (PetscInt i = 0; i < w->n_set; i++) dz[p + w->set[i]] = force[i];
   PetscCall(PetscFree2(force, work));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -948,17 +951,17 @@ PetscErrorCode HycoBodiesSearch(HycoROM m, PetscReal t0, PetscReal t1, PetscReal
   }
   /* The forces of the contact problem name the next set. Opening and closing single contacts by the sign of their
      violation would cycle. */
-  if (!Presses(m, Lambda)) PetscCall(Contacts(m, alpha, Lambda, a));
-  PetscCall(Choose(m, alpha, Lambda, &same, a));
+  if (!BodiesNewtonHasForce(m, Lambda)) PetscCall(BodiesNewtonContacts(m, alpha, Lambda, a));
+  PetscCall(BodiesNewtonChoose(m, alpha, Lambda, &same, a));
   for (PetscInt round = 0; violated && round < ROUNDS && !a->why[0]; round++) {
     /* Again in each round: e0 and z belong to the set. */
     PetscCall(TakeLoads(m));
-    PetscCall(Newton(m, t0, t1, alpha, a));
+    PetscCall(BodiesNewtonSolve(m, t0, t1, alpha, a));
     if (a->why[0]) break;
-    PetscCall(Check(m, alpha, Lambda, &violated));
+    PetscCall(BodiesNewtonCheck(m, alpha, Lambda, &violated));
     if (!violated) break;
-    PetscCall(Contacts(m, alpha, Lambda, a));
-    PetscCall(Choose(m, alpha, Lambda, &same, a));
+    PetscCall(BodiesNewtonContacts(m, alpha, Lambda, a));
+    PetscCall(BodiesNewtonChoose(m, alpha, Lambda, &same, a));
     if (same) break; /* the violation was round-off */
     violated = PETSC_TRUE;
   }

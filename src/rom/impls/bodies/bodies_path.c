@@ -1,4 +1,5 @@
-/* The model of bodies on paths: set-up, the ops of the path, training and report. A step in time is in bodies_newton.c. */
+/* The model of bodies on paths: set-up, the ops of the path, training and report. A step in time is in
+   bodies_newton.c. */
 #include "bodies_path.h"
 #include <petscviewer.h>
 
@@ -13,8 +14,8 @@ static void MoveAll(HycoROM m)
   for (PetscInt i = 0; i < w->bodies.bodies->inelastic->nd; i++) m->U[w->at[i]] = w->u[w->at[i]];
 }
 
-/* The laws of all points in the cells at the forces L (by row), which gives the state at t1: the search has evaluated them
-   at the chosen points only and stored nothing. */
+/* The laws of all points in the cells at the forces L (by row), which gives the state at t1: the search has evaluated
+   them at the chosen points only and stored nothing. */
 static PetscErrorCode SettleCells(HycoROM m, PetscReal t0, PetscReal t1, const PetscReal alpha[], const PetscReal L[],
                                   HycoStepAttempt *a)
 {
@@ -33,8 +34,8 @@ static PetscErrorCode SettleCells(HycoROM m, PetscReal t0, PetscReal t1, const P
 }
 
 /* Displacements of the surfaces and the cells, the state of these, and the residuals, recomputed from them. */
-static PetscErrorCode Settle(HycoROM m, PetscReal t0, PetscReal t1, const PetscReal alpha[], const PetscReal Lambda[],
-                             HycoStepAttempt *a)
+static PetscErrorCode BodiesPathState(HycoROM m, PetscReal t0, PetscReal t1, const PetscReal alpha[],
+                                      const PetscReal Lambda[], HycoStepAttempt *a)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   HycoPath p = w->path;
@@ -51,7 +52,7 @@ static PetscErrorCode Settle(HycoROM m, PetscReal t0, PetscReal t1, const PetscR
     PetscCall(HycoBodiesFrictionMove(w->friction, &w->bodies, &p->kkt));
   else {
     PetscCall(HycoBodiesStrain(&w->bodies, &w->surface, alpha));
-    HycoBodiesGiven(&w->bodies, &w->surface, Lambda);
+    HycoBodiesDisplacementsOfForces(&w->bodies, &w->surface, Lambda);
     MoveAll(m);
     residual = HycoBodiesMeasure(m, &p->kkt);
   }
@@ -61,13 +62,13 @@ static PetscErrorCode Settle(HycoROM m, PetscReal t0, PetscReal t1, const PetscR
   residual = PetscMax(w->friction ? HycoKKTMax(&p->kkt) : residual, a->residual);
   a->converged = (PetscBool)(residual <= 1e-8);
   if (!a->converged) HycoFormat(a->why, "the residual of the contacts is %.1e", (double)residual);
-  if (!a->converged && p->slides[0]) HycoFormat(a->why, "%s", p->slides);
+  if (!a->converged && p->no_equilibrium[0]) HycoFormat(a->why, "%s", p->no_equilibrium);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* First with the tangent that is kept while it contracts; if that fails, once more from the last accepted time
    with a new tangent in each iteration, before the path halves the step. */
-static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAttempt *a)
+static PetscErrorCode BodiesPathIterate(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAttempt *a)
 {
   HycoROM m = (HycoROM)p->ctx;
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -90,14 +91,14 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAt
     w->always = PETSC_TRUE;
     PetscCall(HycoBodiesSearch(m, t0, t1, alpha, L, a));
   }
-  if (!a->why[0]) PetscCall(Settle(m, t0, t1, alpha, L, a));
+  if (!a->why[0]) PetscCall(BodiesPathState(m, t0, t1, alpha, L, a));
   PetscCall(VecRestoreArray(p->U, &alpha));
   PetscCall(VecRestoreArray(p->Lambda, &L));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Whether the responses are those at the present rows, places, stiffness and samples, which become the last ones. */
-static PetscBool Unchanged(HycoROM m)
+static PetscBool BodiesPathIsUnchanged(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const HycoBodiesWork o = &w->bodies;
@@ -120,7 +121,7 @@ static PetscBool Unchanged(HycoROM m)
 
 /* Rows at mu first, then the bodies that they turn with. Nothing of Newton's tables is computed again if rows,
    places and stiffness stay, as in most steps. */
-static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elastic)
+static PetscErrorCode BodiesPathAssemble(HycoPath p, const PetscReal mu[], PetscBool elastic)
 {
   HycoROM m = (HycoROM)p->ctx;
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -133,14 +134,14 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
   else
     PetscCall(HycoBodiesPrepare(&w->bodies, &w->surface, mu));
   /* Elastic bodies with friction need no tables of strains. */
-  if ((w->friction && !w->n_rows) || Unchanged(m)) PetscFunctionReturn(PETSC_SUCCESS);
+  if ((w->friction && !w->n_rows) || BodiesPathIsUnchanged(m)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoBodiesForget(m));
   PetscCall(HycoBodiesScale(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The trace and the listed times need gamma, which is expanded for accepted steps only. */
-static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
+static PetscErrorCode BodiesPathAccept(HycoPath p, const HycoStepAttempt *a)
 {
   HycoROM m = (HycoROM)p->ctx;
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -167,7 +168,7 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
 }
 
 /* The part of s at the points that the modes do not have, relative to s. */
-static PetscReal Misfit(HycoROM m, const PetscReal alpha[])
+static PetscReal BodiesPathMisfit(HycoROM m, const PetscReal alpha[])
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const PetscInt l = w->bodies.bodies->inelastic->m;
@@ -213,7 +214,7 @@ static void MoveBack(HycoROM m)
 
 /* p->why is set if the path ended early: the work then has the refused step, and the listed time is that of the
    last accepted one. */
-static PetscErrorCode Record(HycoPath p)
+static PetscErrorCode BodiesPathRecord(HycoPath p)
 {
   HycoROM m = (HycoROM)p->ctx;
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -229,18 +230,18 @@ static PetscErrorCode Record(HycoPath p)
   HycoFEComplete(m->fe, m->U);
   PetscCall(VecGetArrayRead(p->U, &alpha));
   /* The largest of the listed times is a feature of the estimate. */
-  w->misfit = PetscMax(w->misfit, Misfit(m, alpha));
+  w->misfit = PetscMax(w->misfit, BodiesPathMisfit(m, alpha));
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
   PetscCall(HycoTraceRecord(m, PETSC_TRUE, p->begin, &p->now));
   m->imbalance = PetscMax(m->imbalance, HycoBodiesImbalance(&w->bodies));
   if (w->friction) PetscCall(RecordFriction(m, &p->now));
   loose = &m->trace.loose[m->trace.n_listed - 1];
   if (w->friction)
-    *loose = HycoBodiesFrictionLoose(w->friction, m->loose);
+    *loose = HycoBodiesFrictionFreeMotion(w->friction, m->loose);
   else if (p->now.total_contact_force > 0 || HycoBodiesLoaded(&w->bodies)) {
     char name[HYCO_LINE];
 
-    PetscCall(HycoBodiesLoose(&w->bodies, w->surface.n, m->Lambda, loose));
+    PetscCall(HycoBodiesFreeMotion(&w->bodies, w->surface.n, m->Lambda, loose));
     if (*loose && !m->prediction.loose) p->loose_at[0] = p->t;
     p->loose_at[1] = p->t;
     HycoBodiesNameFloating(&w->bodies, m->model->scene, name);
@@ -258,7 +259,7 @@ static PetscErrorCode Record(HycoPath p)
 /* -- the problem of a step, for programs: from rest -- */
 
 /* By row, with friction. alpha is in HycoBodiesPath. */
-static PetscErrorCode Unknowns(HycoROM m, PetscInt *p, PetscInt *n, PetscReal z[])
+static PetscErrorCode BodiesPathUnknowns(HycoROM m, PetscInt *p, PetscInt *n, PetscReal z[])
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
 
@@ -279,7 +280,7 @@ static PetscErrorCode ProbeCells(HycoROM m, const PetscReal alpha[], const Petsc
 
   PetscFunctionBegin;
   if (!w->bodies.bodies->inelastic->nd) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!Unchanged(m)) {
+  if (!BodiesPathIsUnchanged(m)) {
     PetscCall(HycoBodiesForget(m));
     PetscCall(HycoBodiesScale(m));
   }
@@ -291,7 +292,8 @@ static PetscErrorCode ProbeCells(HycoROM m, const PetscReal alpha[], const Petsc
 }
 
 /* mu: the variables, with the time. Of bodies that flow, z ends with alpha. */
-static PetscErrorCode Residual(HycoROM m, const PetscReal mu[], const PetscReal z[], PetscReal w[], PetscReal *size)
+static PetscErrorCode BodiesPathResidual(HycoROM m, const PetscReal mu[], const PetscReal z[], PetscReal w[],
+                                         PetscReal *size)
 {
   HycoBodiesPath o = (HycoBodiesPath)m->work;
   const PetscInt p = o->bodies.bodies->p;
@@ -314,7 +316,7 @@ static PetscErrorCode Residual(HycoROM m, const PetscReal mu[], const PetscReal 
 }
 
 /* The motions and the forces give the rest: elastic bodies without friction do not depend on the times before. */
-static PetscErrorCode Stand(HycoROM m, PetscInt k, PetscInt listed, PetscBool *able)
+static PetscErrorCode BodiesPathLineariseAtStep(HycoROM m, PetscInt k, PetscInt listed, PetscBool *able)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const PetscInt p = w->bodies.bodies->p, n = m->model->pairs.n;
@@ -322,13 +324,13 @@ static PetscErrorCode Stand(HycoROM m, PetscInt k, PetscInt listed, PetscBool *a
 
   PetscFunctionBegin;
   if (w->path->flows) {
-    if (k >= 0 && !w->friction) PetscCall(Assemble(w->path, m->fe->mu, PETSC_FALSE));
-    PetscCall(HycoBodiesLawsStand(m, k, able));
+    if (k >= 0 && !w->friction) PetscCall(BodiesPathAssemble(w->path, m->fe->mu, PETSC_FALSE));
+    PetscCall(HycoBodiesLawsLinearise(m, k, able));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   /* Models of elastic bodies that have unknowns of cells are of older files. */
   *able = (PetscBool)!w->bodies.bodies->inelastic->nd;
-  if (*able && w->friction) PetscCall(HycoBodiesAlongStand(m, w->friction, &w->bodies, k, NULL, able));
+  if (*able && w->friction) PetscCall(HycoBodiesSensitivityLinearise(m, w->friction, &w->bodies, k, NULL, able));
   if (!*able || k < 0 || w->friction) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(p + n + 1, &z));
   PetscCall(PetscArraycpy(z, w->motions + listed * p, p));
@@ -337,66 +339,69 @@ static PetscErrorCode Stand(HycoROM m, PetscInt k, PetscInt listed, PetscBool *a
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Rest(HycoROM m, const PetscInt **row, PetscReal w[], PetscReal *size)
+static PetscErrorCode BodiesPathStepResidual(HycoROM m, const PetscInt **row, PetscReal w[], PetscReal *size)
 {
   HycoBodiesPath o = (HycoBodiesPath)m->work;
 
   PetscFunctionBegin;
   HycoBodiesWorkOnMotions(&o->bodies, w);
   if (o->friction)
-    HycoBodiesAlongRest(o->friction, row, w + o->bodies.bodies->p, size);
+    HycoBodiesSensitivityResidual(o->friction, row, w + o->bodies.bodies->p, size);
   else
-    PetscCall(HycoBodiesLawsRest(m, row, w, size));
+    PetscCall(HycoBodiesLawsResidual(m, row, w, size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Near(HycoROM m, const PetscReal mu[], PetscInt n, const PetscInt contact[], PetscBool rows,
-                           const PetscReal z[], PetscInt point, PetscReal w[])
+static PetscErrorCode BodiesPathPerturbedState(HycoROM m, const PetscReal mu[], PetscInt n, const PetscInt contact[],
+                                               PetscBool rows, const PetscReal z[], PetscInt point, PetscReal w[])
 {
   HycoBodiesPath o = (HycoBodiesPath)m->work;
 
   PetscFunctionBegin;
   if (o->friction)
-    PetscCall(HycoBodiesAlongNear(m, o->friction, mu, contact, rows, z, point, w));
+    PetscCall(HycoBodiesSensitivityPerturbed(m, o->friction, mu, contact, rows, z, point, w));
   else
     PetscCall(HycoBodiesNear(m, mu, n, contact, rows, z, point, w));
-  if (o->path->flows) PetscCall(HycoBodiesLawsBeside(m, mu, point));
+  if (o->path->flows) PetscCall(HycoBodiesLawsPerturbed(m, mu, point));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Along(HycoROM m, PetscInt parameter, const PetscReal weight[3], const PetscInt point[3],
-                            const PetscReal q[], PetscReal dz[], PetscBool *regular)
+static PetscErrorCode BodiesPathSensitivity(HycoROM m, PetscInt parameter, const PetscReal weight[3],
+                                            const PetscInt point[3], const PetscReal q[], PetscReal dz[],
+                                            PetscBool *regular)
 {
   HycoBodiesPath o = (HycoBodiesPath)m->work;
 
   PetscFunctionBegin;
   if (o->path->flows)
-    PetscCall(HycoBodiesLawsAlong(m, parameter, weight, point, q, dz, regular));
+    PetscCall(HycoBodiesLawsSensitivity(m, parameter, weight, point, q, dz, regular));
   else
-    PetscCall(HycoBodiesAlongStep(o->friction, parameter, weight, point, q, dz, regular));
-  if (*regular && !o->path->flows) HycoBodiesAlongTake(o->friction, parameter, dz);
+    PetscCall(HycoBodiesSensitivityAdvance(o->friction, parameter, weight, point, q, dz, regular));
+  if (*regular && !o->path->flows) HycoBodiesSensitivityAccept(o->friction, parameter, dz);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Slope(HycoROM m, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
-                            const PetscInt point[2], const PetscReal dz[], const PetscBool modes[],
-                            const PetscBool dofs[], PetscReal dgamma[], PetscReal dU[])
+static PetscErrorCode BodiesPathFieldDerivatives(HycoROM m, PetscInt n, const PetscInt contact[],
+                                                 const PetscReal weight[2], const PetscInt point[2],
+                                                 const PetscReal dz[], const PetscBool modes[], const PetscBool dofs[],
+                                                 PetscReal dgamma[], PetscReal dU[])
 {
   PetscFunctionBegin;
-  PetscCall(HycoBodiesSlope(m, n, contact, weight, point, dz, modes, dofs, dgamma, dU));
-  if (((HycoBodiesPath)m->work)->path->flows) HycoBodiesLawsSlope(m, dU);
+  PetscCall(HycoBodiesDerivatives(m, n, contact, weight, point, dz, modes, dofs, dgamma, dU));
+  if (((HycoBodiesPath)m->work)->path->flows) HycoBodiesLawsDerivatives(m, dU);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Show(HycoROM m, PetscInt parameter, PetscBool rows, PetscReal step, const PetscReal dz[])
+static PetscErrorCode BodiesPathShow(HycoROM m, PetscInt parameter, PetscBool rows, PetscReal step,
+                                     const PetscReal dz[])
 {
   PetscFunctionBegin;
-  PetscCall(HycoBodiesAlongShow(m, ((HycoBodiesPath)m->work)->friction, parameter, rows, step, dz));
+  PetscCall(HycoBodiesSensitivityView(m, ((HycoBodiesPath)m->work)->friction, parameter, rows, step, dz));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Of that state. */
-static PetscErrorCode Expand(HycoROM m)
+static PetscErrorCode BodiesPathExpand(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const PetscScalar *alpha;
@@ -469,7 +474,7 @@ static PetscErrorCode FindPoints(HycoROM m)
 }
 
 /* Sizes are those of HycoBodiesPath; the columns of contacts follow on demand. */
-static PetscErrorCode Allocate(HycoROM m)
+static PetscErrorCode BodiesPathAllocate(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   HycoBodiesInelastic in = w->bodies.bodies->inelastic;
@@ -502,7 +507,7 @@ static PetscErrorCode Allocate(HycoROM m)
   PetscCall(PetscMalloc1(l + 1, &w->pivot));
   PetscCall(PetscCalloc1(pairs + 1, &w->column));
   PetscCall(PetscCalloc1(pairs + 1, &w->gap));
-  /* kappa and the weights of the samples of each body: what Unchanged() compares. */
+  /* kappa and the weights of the samples of each body: what BodiesPathIsUnchanged() compares. */
   for (PetscInt k = 0; k < w->bodies.bodies->n; k++) samples += 1 + w->bodies.bodies->body[k].n_samples;
   PetscCall(PetscCalloc1(samples + 1, &w->last));
   PetscCall(PetscMalloc1(pairs + 1, &w->set));
@@ -515,7 +520,10 @@ static PetscErrorCode Allocate(HycoROM m)
    elastic tangents J would be 1, and Newton's method a fixed-point iteration. */
 static PetscErrorCode CreatePath(HycoROM m)
 {
-  static const HycoPathOps ops = {.assemble = Assemble, .iterate = Iterate, .accept = Accept, .record = Record};
+  static const HycoPathOps ops = {.assemble = BodiesPathAssemble,
+                                  .iterate = BodiesPathIterate,
+                                  .accept = BodiesPathAccept,
+                                  .record = BodiesPathRecord};
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   HycoPath p;
 
@@ -564,13 +572,13 @@ static PetscErrorCode SetUp(HycoROM m)
   PetscCall(HycoBodiesSetUp(&w->bodies, w->bodies.bodies, m->model->scene, &w->surface, m->solver));
   PetscCall(FindUnknowns(m));
   PetscCall(FindPoints(m));
-  PetscCall(Allocate(m));
+  PetscCall(BodiesPathAllocate(m));
   PetscCall(CreatePath(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Also after a set-up that failed half-way: all parts are NULL-safe, and `bodies` is set first. */
-static PetscErrorCode Reset(HycoROM m)
+static PetscErrorCode BodiesPathReset(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
 
@@ -586,13 +594,13 @@ static PetscErrorCode Reset(HycoROM m)
   PetscCall(HycoPathFree(&w->path));
   PetscCall(HycoBodiesLawsDestroy(w));
   if (w->bodies.bodies) PetscCall(HycoBodiesReset(&w->bodies));
-  PetscCall(HycoBodiesAlongDestroy(w->friction));
+  PetscCall(HycoBodiesSensitivityDestroy(w->friction));
   PetscCall(HycoBodiesFrictionDestroy(&w->friction));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The path itself is HycoTraceFollow(): this only resets what would carry over from another prediction. */
-static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
+static PetscErrorCode BodiesPathSolve(HycoROM m, const PetscReal mu[])
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
 
@@ -609,7 +617,7 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
 }
 
 /* The part of the inelastic forces that the modes do not have; and the bound of interpolated flexibilities. */
-static PetscErrorCode Features(HycoROM m, PetscReal misfit[2])
+static PetscErrorCode BodiesPathFeatures(HycoROM m, PetscReal misfit[2])
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
 
@@ -622,7 +630,7 @@ static PetscErrorCode Features(HycoROM m, PetscReal misfit[2])
 
 /* The amplification is the factor between an error of the strains at the points and one of the fields, as found in
    training. */
-static PetscErrorCode View(HycoROM m, PetscViewer viewer)
+static PetscErrorCode BodiesPathView(HycoROM m, PetscViewer viewer)
 {
   HycoBodiesInelastic in = ((HycoSubstructures)m->model->data)->inelastic;
 
@@ -651,20 +659,20 @@ PetscErrorCode HycoBodiesTakePath(HycoROM m)
                                        .work = sizeof(struct _n_HycoBodiesPath),
                                        .resultants = PETSC_TRUE};
   static const HycoROMOps ops = {.setup = SetUp,
-                                 .reset = Reset,
-                                 .solve = Solve,
-                                 .unknowns = Unknowns,
-                                 .residual = Residual,
-                                 .stand = Stand,
+                                 .reset = BodiesPathReset,
+                                 .solve = BodiesPathSolve,
+                                 .unknowns = BodiesPathUnknowns,
+                                 .residual = BodiesPathResidual,
+                                 .linearise = BodiesPathLineariseAtStep,
                                  .jacobian = HycoBodiesJacobian,
-                                 .beside = Near,
-                                 .rest = Rest,
-                                 .along = Along,
-                                 .show = Show,
-                                 .slope = Slope,
-                                 .expand = Expand,
-                                 .features = Features,
-                                 .view = View,
+                                 .perturbed = BodiesPathPerturbedState,
+                                 .step_residual = BodiesPathStepResidual,
+                                 .sensitivity = BodiesPathSensitivity,
+                                 .show = BodiesPathShow,
+                                 .slope = BodiesPathFieldDerivatives,
+                                 .expand = BodiesPathExpand,
+                                 .features = BodiesPathFeatures,
+                                 .view = BodiesPathView,
                                  .save = HycoBodiesFile,
                                  .load = HycoBodiesFile,
                                  .destroy = HycoBodiesDestroyModel};

@@ -46,8 +46,8 @@ typedef struct _n_HycoBodiesPath {
   PetscReal misfit;         /* of s in the span of the modes at the points, the largest of the listed times */
 } * HycoBodiesPath;
 
-/* Forgets the responses of the contacts and the set, after a change of rows or stiffness; takes strains and responses of the
-   modes at the present ones. */
+/* Forgets the responses of the contacts and the set, after a change of rows or stiffness; takes strains and responses
+   of the modes at the present ones. */
 PetscErrorCode HycoBodiesForget(HycoROM model);
 /* Forgets the set alone. */
 void HycoBodiesRestart(HycoROM model);
@@ -69,16 +69,17 @@ PetscErrorCode HycoBodiesSolveTangent(HycoBodiesPath work, PetscReal x[]);
 /* dz, motions and forces by contact, from the change q of w at fixed forces. */
 PetscErrorCode HycoBodiesMoveSet(HycoBodiesPath work, const PetscReal q[], PetscReal dz[]);
 
-/* Derivatives of paths of bodies that deform inelastically (bodies_laws.c), as the ops `stand`, `rest`, `beside`, `along`
-   and `slope`; Record: of an accepted step; Begin: of a path. */
+/* Derivatives of paths of bodies that deform inelastically (bodies_laws.c), as the ops `linearise`, `step_residual`,
+   `perturbed`, `sensitivity` and `slope`; Record: of an accepted step; Begin: of a path. */
 PetscErrorCode HycoBodiesLawsBegin(HycoROM model);
 PetscErrorCode HycoBodiesLawsRecord(HycoROM model, const PetscReal alpha[]);
-PetscErrorCode HycoBodiesLawsStand(HycoROM model, PetscInt k, PetscBool *able);
-PetscErrorCode HycoBodiesLawsRest(HycoROM model, const PetscInt **row, PetscReal w[], PetscReal *size);
-PetscErrorCode HycoBodiesLawsBeside(HycoROM model, const PetscReal mu[], PetscInt point);
-PetscErrorCode HycoBodiesLawsAlong(HycoROM model, PetscInt parameter, const PetscReal weight[3],
-                                   const PetscInt point[3], const PetscReal q[], PetscReal dz[], PetscBool *regular);
-void HycoBodiesLawsSlope(HycoROM model, PetscReal dU[]);
+PetscErrorCode HycoBodiesLawsLinearise(HycoROM model, PetscInt k, PetscBool *able);
+PetscErrorCode HycoBodiesLawsResidual(HycoROM model, const PetscInt **row, PetscReal w[], PetscReal *size);
+PetscErrorCode HycoBodiesLawsPerturbed(HycoROM model, const PetscReal mu[], PetscInt point);
+PetscErrorCode HycoBodiesLawsSensitivity(HycoROM model, PetscInt parameter, const PetscReal weight[3],
+                                         const PetscInt point[3], const PetscReal q[], PetscReal dz[],
+                                         PetscBool *regular);
+void HycoBodiesLawsDerivatives(HycoROM model, PetscReal dU[]);
 PetscErrorCode HycoBodiesLawsDestroy(HycoBodiesPath work);
 
 #endif

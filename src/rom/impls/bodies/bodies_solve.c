@@ -18,16 +18,16 @@
 #define COARSE  4     /* one of so many contacts is in the first problem of bodies that contact alone holds */
 #define FEW     64    /* contacts that are all in it */
 
-/* `weight`, `share` and `blend` hold one array per body, and `bodies` has their number; the zeros afterwards make a second
-   call, and HycoBodiesSetUp() on the same work, safe. */
+/* `weight`, `share` and `blend` hold one array per body, and `bodies` has their number; the zeros afterwards make a
+   second call, and HycoBodiesSetUp() on the same work, safe. */
 PetscErrorCode HycoBodiesReset(HycoBodiesWork o)
 {
   PetscFunctionBegin;
-  PetscCall(HycoBodiesForgetKept(o));
+  PetscCall(HycoBodiesResetRowCache(o));
   PetscCall(HycoFEDestroy(&o->fe));
   PetscCall(HycoTaoDestroy(&o->tao));
   PetscCall(HycoSolverDestroy(&o->own));
-  PetscCall(HycoBodiesForgetBeside(o));
+  PetscCall(HycoBodiesResetPerturbed(o));
   for (PetscInt k = 0; o->R && k < o->bodies->n; k++)
     HycoFreeAll(&o->weight[k], &o->share[k], &o->share_H[k], &o->share_a[k], &o->blend[k], &o->R[k]);
   for (PetscInt k = 0; o->response && k < o->n_contacts * o->bodies->n; k++) PetscCall(PetscFree(o->response[k]));
@@ -111,8 +111,8 @@ PetscErrorCode HycoBodiesWeights(HycoSubstructures b, PetscInt k, const PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The Lebesgue function of the interpolation at the present weights: outside the nodes it grows as the error of a polynomial
-   may. */
+/* The Lebesgue function of the interpolation at the present weights: outside the nodes it grows as the error of a
+   polynomial may. */
 PetscReal HycoBodiesStretch(HycoBodiesWork o)
 {
   PetscReal most = 0;
@@ -281,7 +281,7 @@ PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene 
 /* -- the bodies at mu -- */
 
 /* Where they are, and how stiff. */
-static PetscErrorCode Place(HycoBodiesWork o, const PetscReal mu[])
+static PetscErrorCode BodiesPlace(HycoBodiesWork o, const PetscReal mu[])
 {
   const HycoSubstructures b = o->bodies;
   HycoMesh m = b->probe;
@@ -347,7 +347,7 @@ static PetscErrorCode FindLoads(HycoBodiesWork o)
 }
 
 /* The displacements that they cause without contact. */
-static PetscErrorCode Load(HycoBodiesWork o)
+static PetscErrorCode BodiesSolveLoad(HycoBodiesWork o)
 {
   const HycoSubstructures b = o->bodies;
 
@@ -366,13 +366,14 @@ static PetscErrorCode Load(HycoBodiesWork o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Shares of the loads below which their work, and what is left of it by the forces, is round-off: of the coefficients, which
-   carry that of the interpolation of the loads. */
+/* Shares of the loads below which their work, and what is left of it by the forces, is round-off: of the coefficients,
+   which carry that of the interpolation of the loads. */
 #define BALANCED 1e-11
 #define LEFT     1e-12
 #define ROUNDED  1e-13 /* the same of a work that is not small */
 
-/* The work of the loads on motion i; 0 where vectors of the basis cancel, as it is of a load that does not act on it. */
+/* The work of the loads on motion i; 0 where vectors of the basis cancel, as it is of a load that does not act on
+   it. */
 PetscReal HycoBodiesLoadWork(HycoBodiesWork o, PetscInt i)
 {
   const PetscInt r = o->bodies->r;
@@ -495,8 +496,8 @@ static PetscErrorCode TurnRows(HycoBodiesWork o, const HycoBodiesSurface *s)
 
 /* -- flexibilities -- */
 
-/* The weights of the samples at mu, and what depends on them alone; columns with other ones are forgotten. alone: only the
-   weights. */
+/* The weights of the samples at mu, and what depends on them alone; columns with other ones are forgotten. alone: only
+   the weights. */
 static PetscErrorCode TakeWeights(HycoBodiesWork o, const PetscReal mu[], PetscBool alone)
 {
   const HycoSubstructures b = o->bodies;
@@ -554,9 +555,9 @@ typedef struct {
   PetscReal *M, *q, *z;
 } Problem;
 
-/* o->response of a contact: C row^T of each body that its row touches, without kappa. Made once at the present parameters:
-   further problems, and the displacements, take it from there. */
-static PetscErrorCode Respond(HycoBodiesWork o, PetscInt contact)
+/* o->response of a contact: C row^T of each body that its row touches, without kappa. Made once at the present
+   parameters: further problems, and the displacements, take it from there. */
+static PetscErrorCode BodiesSolveRespond(HycoBodiesWork o, PetscInt contact)
 {
   const HycoSubstructures b = o->bodies;
   PetscReal **response = o->response + contact * b->n;
@@ -591,10 +592,10 @@ static PetscErrorCode FillRow(HycoBodiesWork o, Problem *p, PetscInt first, Pets
 
   PetscFunctionBegin;
   if (o->kept.same) {
-    HycoBodiesKeptRow(o, p->contact[first], p->n - first, p->contact + first, row);
+    HycoBodiesRowCacheGet(o, p->contact[first], p->n - first, p->contact + first, row);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(Respond(o, p->contact[first]));
+  PetscCall(BodiesSolveRespond(o, p->contact[first]));
   for (PetscInt k = 0; k < b->n; k++) {
     const PetscReal *y = o->response[p->contact[first] * b->n + k], scale = 1 / o->kappa[k];
     const PetscInt lo = b->start[k], hi = b->start[k + 1];
@@ -614,7 +615,7 @@ static PetscErrorCode FillRow(HycoBodiesWork o, Problem *p, PetscInt first, Pets
 }
 
 /* M = [0 A; -A^T W] and q = (-work, w) of the contacts in the problem. */
-static PetscErrorCode Fill(HycoBodiesWork o, Problem *p)
+static PetscErrorCode BodiesSolveFill(HycoBodiesWork o, Problem *p)
 {
   const HycoSubstructures b = o->bodies;
   const size_t n = (size_t)(b->p + p->n);
@@ -689,8 +690,8 @@ static PetscErrorCode SolveSet(HycoBodiesWork o, Problem *p, PetscBool *solved)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Frees what Fill() made. */
-static PetscErrorCode Release(Problem *p)
+/* Frees what BodiesSolveFill() made. */
+static PetscErrorCode BodiesSolveRelease(Problem *p)
 {
   PetscFunctionBegin;
   PetscCall(PetscFree(p->M));
@@ -709,7 +710,7 @@ static PetscErrorCode SolveProblem(HycoBodiesWork o, Problem *p, PetscReal Lambd
   HycoCheckModel(
       set || !b->p,
       "-hyco_solver_type: contact alone holds a body, and a model of bodies solves such problems by active_set");
-  PetscCall(Fill(o, p));
+  PetscCall(BodiesSolveFill(o, p));
   for (PetscInt k = 0; k < p->n; k++) o->active[k] = PETSC_TRUE;
   /* The active set may cycle (W need not be an M-matrix); the solver's other methods then take over if its
      fallback is allowed. */
@@ -719,7 +720,7 @@ static PetscErrorCode SolveProblem(HycoBodiesWork o, Problem *p, PetscReal Lambd
   for (PetscInt i = 0; i < b->p; i++) o->x[i] = p->z[i];
   for (PetscInt k = 0; k < p->n; k++) /* negative by round-off; the residuals are recomputed */
     Lambda[p->contact[k]] = b->p && !o->active[k] ? 0 : PetscMax(p->z[b->p + k], 0);
-  PetscCall(Release(p));
+  PetscCall(BodiesSolveRelease(p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -731,15 +732,15 @@ PetscErrorCode HycoBodiesMatrix(HycoBodiesWork o, PetscInt n, const PetscInt con
 
   PetscFunctionBegin;
   HycoDuplicate(n, contact, &p.contact);
-  PetscCall(Fill(o, &p));
+  PetscCall(BodiesSolveFill(o, &p));
   /* As [0 Z^T B^T; -B Z W]: the motions come before the contacts, as in z. */
   PetscCall(PetscArraycpy(M, p.M, size * size));
-  PetscCall(Release(&p));
+  PetscCall(BodiesSolveRelease(&p));
   PetscCall(PetscFree(p.contact));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoBodiesYield(HycoBodiesWork o, const PetscReal f[], PetscReal to[])
+PetscErrorCode HycoBodiesAddCompliance(HycoBodiesWork o, const PetscReal f[], PetscReal to[])
 {
   const HycoSubstructures b = o->bodies;
 
@@ -777,14 +778,14 @@ PetscErrorCode HycoBodiesRespond(HycoBodiesWork o, const PetscReal f[])
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(o->f, f, o->bodies->ns));
   PetscCall(PetscArraycpy(o->u, o->free, o->bodies->ns));
-  PetscCall(HycoBodiesYield(o, o->f, o->u));
+  PetscCall(HycoBodiesAddCompliance(o, o->f, o->u));
   MoveRigidly(o);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* u = free - C f / kappa + Z x. Exact for any forces: the approximation of the model is in C and in the samples' blend
    only. */
-static PetscErrorCode Displace(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal Lambda[])
+static PetscErrorCode BodiesSolveDisplace(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal Lambda[])
 {
   const HycoSubstructures b = o->bodies;
 
@@ -796,10 +797,10 @@ static PetscErrorCode Displace(HycoBodiesWork o, const HycoBodiesSurface *s, con
   }
   PetscCall(PetscArraycpy(o->u, o->free, b->ns));
   /* Kept products P = C B^T give u, or those at the present parameters. */
-  if (o->kept.same) PetscCall(HycoBodiesKeptDisplace(o, s->n, Lambda, o->u));
+  if (o->kept.same) PetscCall(HycoBodiesRowCacheDisplace(o, s->n, Lambda, o->u));
   for (PetscInt k = 0; k < s->n && !o->kept.same; k++) {
     if (Lambda[k] == 0) continue;
-    PetscCall(Respond(o, k));
+    PetscCall(BodiesSolveRespond(o, k));
     for (PetscInt j = 0; j < b->n; j++) {
       const PetscReal *y = o->response[k * b->n + j];
 
@@ -811,8 +812,8 @@ static PetscErrorCode Displace(HycoBodiesWork o, const HycoBodiesSurface *s, con
 }
 
 /* Adds the contacts outside the problem that penetrate in the present displacements; *more: there are some. */
-static void Join(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal size, PetscBool in[], Problem *p,
-                 PetscBool *more)
+static void BodiesSolveJoin(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal size, PetscBool in[], Problem *p,
+                            PetscBool *more)
 {
   *more = PETSC_FALSE;
   for (PetscInt k = 0; k < s->n; k++) {
@@ -828,9 +829,9 @@ static void Join(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal size, P
 }
 
 /* least[]: by contact of the scene, the depth without contact from which contacts are in the first problem: half of the
-   deepest one, which is about that of those that stay closed on a rounded surface. Where all are closed, as under a body
-   that a soft spring holds, the depth is that of the body's motion, and the shape of the surfaces is what is left: those
-   nearest to the deepest one. */
+   deepest one, which is about that of those that stay closed on a rounded surface. Where all are closed, as under a
+   body that a soft spring holds, the depth is that of the body's motion, and the shape of the surfaces is what is left:
+   those nearest to the deepest one. */
 static PetscErrorCode FirstDepth(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal size, PetscReal least[])
 {
   const PetscInt n = s->fe->scene->n_contacts;
@@ -876,7 +877,8 @@ static void TakeEvery(HycoBodiesWork o, const HycoBodiesSurface *s, PetscInt str
 /* The first problem: the deepest contacts. Without the contacts that alone hold a body there is no depth: then one of
    COARSE contacts, whose forces push the bodies together about as those of all do, so that the contacts which these
    bodies still meet are few more than those that close. */
-static PetscErrorCode Begin(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal size, PetscBool in[], Problem *p)
+static PetscErrorCode BodiesSolveBegin(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal size, PetscBool in[],
+                                       Problem *p)
 {
   PetscReal *least;
   PetscInt n = 0;
@@ -924,7 +926,7 @@ static PetscErrorCode SolveRounds(HycoBodiesWork o, const HycoBodiesSurface *s, 
     size = PetscMax(size, PetscAbsReal(o->gap[k]));
     n++;
   }
-  PetscCall(Begin(o, s, size, in, p));
+  PetscCall(BodiesSolveBegin(o, s, size, in, p));
   *solved = PETSC_TRUE;
   PetscCall(PetscArrayzero(o->x, b->p));
   /* Contacts only join, so that the rounds end; those that need no force get none from the problem itself. */
@@ -937,9 +939,9 @@ static PetscErrorCode SolveRounds(HycoBodiesWork o, const HycoBodiesSurface *s, 
       *solved = PETSC_TRUE;
       continue;
     }
-    PetscCall(Displace(o, s, Lambda));
+    PetscCall(BodiesSolveDisplace(o, s, Lambda));
     if (!round && b->p && p->n < n) DropOpen(o, in, p);
-    Join(o, s, size, in, p, &more);
+    BodiesSolveJoin(o, s, size, in, p, &more);
   }
   /* Penetrating contacts were left out of the last problem: its forces are no solution. */
   if (*solved && more) o->reason = HYCO_DIVERGED_ITERATIONS;
@@ -948,7 +950,7 @@ static PetscErrorCode SolveRounds(HycoBodiesWork o, const HycoBodiesSurface *s, 
 }
 
 /* What changes from the parameters of the last call to mu. */
-static HycoChanges Changes(HycoBodiesWork o, const PetscReal mu[], PetscBool *forces)
+static HycoChanges BodiesSolveListChanges(HycoBodiesWork o, const PetscReal mu[], PetscBool *forces)
 {
   const HycoScene scene = o->fe->scene;
   PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
@@ -958,13 +960,14 @@ static HycoChanges Changes(HycoBodiesWork o, const PetscReal mu[], PetscBool *fo
   return HycoSceneChanges(scene, changed);
 }
 
-/* The order matters: weights before Load() and BlendMotions(), the pose and kappa before both, all displacements
-   without contact before TurnRows(), which subtracts them from the gaps. Only what the changed parameters enter. alone: the
-   data of the bodies and the rows, without displacements. */
-static PetscErrorCode Bring(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal mu[], PetscBool alone)
+/* The order matters: weights before BodiesSolveLoad() and BlendMotions(), the pose and kappa before both, all
+   displacements without contact before TurnRows(), which subtracts them from the gaps. Only what the changed parameters
+   enter. alone: the data of the bodies and the rows, without displacements. */
+static PetscErrorCode BodiesSolveUpdate(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal mu[],
+                                        PetscBool alone)
 {
   PetscBool forces;
-  const HycoChanges c = Changes(o, mu, &forces);
+  const HycoChanges c = BodiesSolveListChanges(o, mu, &forces);
   const PetscBool first = (PetscBool)!o->prepared;
 
   PetscFunctionBegin;
@@ -972,12 +975,12 @@ static PetscErrorCode Bring(HycoBodiesWork o, const HycoBodiesSurface *s, const 
   o->prepared = PETSC_FALSE;
   if (first || c.nodes || c.stiffness) {
     PetscCall(TakeWeights(o, mu, alone));
-    PetscCall(Place(o, mu));
+    PetscCall(BodiesPlace(o, mu));
     PetscCall(BlendMotions(o));
     PetscCall(HycoBodiesMoveMotions(o, s, mu));
   } else
     PetscCall(HycoFESetParameters(o->fe, mu));
-  if (forces) PetscCall(alone ? FindLoads(o) : Load(o));
+  if (forces) PetscCall(alone ? FindLoads(o) : BodiesSolveLoad(o));
   if (s) PetscCall(TurnRows(o, s));
   PetscCall(PetscArraycpy(o->mu, mu, o->fe->scene->n_variables));
   o->prepared = PETSC_TRUE;
@@ -987,7 +990,7 @@ static PetscErrorCode Bring(HycoBodiesWork o, const HycoBodiesSurface *s, const 
 PetscErrorCode HycoBodiesBring(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal mu[])
 {
   PetscFunctionBegin;
-  PetscCall(Bring(o, s, mu, PETSC_TRUE));
+  PetscCall(BodiesSolveUpdate(o, s, mu, PETSC_TRUE));
   HycoCheck(!o->lacks, "beside this point, %s", HycoReasonName(HYCO_DIVERGED_SURFACE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -995,7 +998,7 @@ PetscErrorCode HycoBodiesBring(HycoBodiesWork o, const HycoBodiesSurface *s, con
 PetscErrorCode HycoBodiesPrepare(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal mu[])
 {
   PetscFunctionBegin;
-  PetscCall(Bring(o, s, mu, PETSC_FALSE));
+  PetscCall(BodiesSolveUpdate(o, s, mu, PETSC_FALSE));
   PetscCall(PetscArrayzero(o->responded, s->n));
   PetscCall(HycoBodiesKeepRows(o, s->n));
   PetscCall(HycoBodiesStrain(o, s, NULL));
@@ -1026,9 +1029,9 @@ PetscErrorCode HycoBodiesStrain(HycoBodiesWork o, const HycoBodiesSurface *s, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Columns of contacts with a force are kept first: HycoBodiesKeptDisplace() passes over those that are not, which
+/* Columns of contacts with a force are kept first: HycoBodiesRowCacheDisplace() passes over those that are not, which
    would lose their displacement. */
-void HycoBodiesGiven(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal Lambda[])
+void HycoBodiesDisplacementsOfForces(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal Lambda[])
 {
   PetscInt *closed, n = 0;
 
@@ -1038,7 +1041,7 @@ void HycoBodiesGiven(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscRe
   }
   PetscCallVoid(HycoBodiesKeep(o, n, closed));
   PetscCallVoid(PetscFree(closed));
-  PetscCallVoid(Displace(o, s, Lambda));
+  PetscCallVoid(BodiesSolveDisplace(o, s, Lambda));
 }
 
 /* Needs HycoBodiesPrepare(), and HycoBodiesStrain() for inelastic strains. Rank-local: models live on one process. */
@@ -1073,8 +1076,8 @@ PetscErrorCode HycoBodiesSolve(HycoBodiesWork o, const HycoBodiesSurface *s, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The residual of equilibrium along the rigid motions that contact alone prevents, relative to the terms of each, without
-   the round-off of loads (of a basis of length 1) and forces that balance themselves: no other force has to. */
+/* The residual of equilibrium along the rigid motions that contact alone prevents, relative to the terms of each,
+   without the round-off of loads (of a basis of length 1) and forces that balance themselves: no other force has to. */
 PetscReal HycoBodiesUnbalanced(HycoBodiesWork o)
 {
   const HycoSubstructures b = o->bodies;
@@ -1099,8 +1102,8 @@ PetscReal HycoBodiesUnbalanced(HycoBodiesWork o)
   return most;
 }
 
-/* On a motion along which neither loads nor forces act, as a body's that slides without friction, the terms are round-off of those
-   of the others: it has no balance to miss. */
+/* On a motion along which neither loads nor forces act, as a body's that slides without friction, the terms are
+   round-off of those of the others: it has no balance to miss. */
 PetscReal HycoBodiesImbalance(HycoBodiesWork o)
 {
   const HycoSubstructures b = o->bodies;
@@ -1135,9 +1138,9 @@ void HycoBodiesMotionRow(HycoBodiesWork o, PetscInt k, PetscReal g[])
     HycoBodiesAdd(p, o->row[e], o->Z + o->row_at[e] * p, g);
 }
 
-/* Whether the contacts with a force leave a rigid motion free. By Cholesky's pivots of G^T G over them, G = B Z, relative to
-   the motions' squared lengths over all contacts. */
-PetscErrorCode HycoBodiesLoose(HycoBodiesWork o, PetscInt n, const PetscReal Lambda[], PetscBool *loose)
+/* Whether the contacts with a force leave a rigid motion free. By Cholesky's pivots of G^T G over them, G = B Z,
+   relative to the motions' squared lengths over all contacts. */
+PetscErrorCode HycoBodiesFreeMotion(HycoBodiesWork o, PetscInt n, const PetscReal Lambda[], PetscBool *loose)
 {
   const PetscInt p = o->bodies->p;
   PetscReal *gram, *all, *g, least = 0;
@@ -1178,8 +1181,8 @@ void HycoBodiesNameFloating(HycoBodiesWork o, HycoScene scene, char name[HYCO_LI
 }
 
 /* By nonnegative least squares, as at full order: the rest is a motion that closes no contact. */
-PetscErrorCode HycoBodiesLifts(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal L[], char name[HYCO_LINE],
-                               PetscBool *lifts)
+PetscErrorCode HycoBodiesLiftOff(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal L[],
+                                 char name[HYCO_LINE], PetscBool *lift_off)
 {
   const PetscInt p = o->bodies->p;
   const PetscReal one = 1;
@@ -1188,7 +1191,7 @@ PetscErrorCode HycoBodiesLifts(HycoBodiesWork o, const HycoBodiesSurface *s, con
   PetscBool regular, exists;
 
   PetscFunctionBegin;
-  *lifts = PETSC_FALSE;
+  *lift_off = PETSC_FALSE;
   if (!p || o->lacks) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscCalloc4(p * s->n + 1, &A, p, &f, s->n + 1, &force, p * p, &gram));
   for (PetscInt i = 0; i < p; i++) f[i] = HycoBodiesLoadWork(o, i);
@@ -1203,12 +1206,12 @@ PetscErrorCode HycoBodiesLifts(HycoBodiesWork o, const HycoBodiesSurface *s, con
   if (regular) BLAStrsm_("L", "U", "T", "N", &rows, &columns, &one, gram, &rows, A, &rows);
   if (regular) BLAStrsm_("L", "U", "T", "N", &rows, &each, &one, gram, &rows, f, &rows);
   PetscCall(HycoNormalsBalance(p, s->n, A, f, HycoBodiesLoadRounding(o), force, &exists));
-  *lifts = (PetscBool)!exists;
+  *lift_off = (PetscBool)!exists;
   for (PetscInt k = 0; k < p * s->n; k++) f[k % p] -= A[k] * force[k / p];
   if (regular) BLAStrsm_("L", "U", "N", "N", &rows, &each, &one, gram, &rows, f, &rows);
   for (PetscInt i = 0; i < p; i++) most = PetscMax(most, PetscAbsReal(f[i]));
   for (PetscInt i = 0; i < p && most > 0; i++) f[i] /= most;
-  if (*lifts) PetscCall(HycoBodiesNameMotion(o, s, L, f, name));
+  if (*lift_off) PetscCall(HycoBodiesNameMotion(o, s, L, f, name));
   PetscCall(PetscFree4(A, f, force, gram));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -1240,7 +1243,7 @@ PetscReal HycoBodiesBound(HycoBodiesWork o, PetscReal *norm)
 /* -- displacements -- */
 
 /* Most bodies stay in the axes of the scene. */
-static PetscBool Turns(const HycoPose *pose)
+static PetscBool BodiesTurn(const HycoPose *pose)
 {
   for (PetscInt i = 0; i < 9; i++) {
     if (pose->Q[i] != (i % 4 == 0)) return PETSC_TRUE;
@@ -1261,7 +1264,7 @@ void HycoBodiesMove(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal U[])
     PetscReal own[3] = {0, 0, 0}, turned[3];
 
     for (PetscInt c = 0; c < dim; c++) own[c] = loc[c] < 0 ? 0 : o->u[loc[c]];
-    if (o->placed_in[k] != body) turns = Turns(&o->pose[body = o->placed_in[k]]);
+    if (o->placed_in[k] != body) turns = BodiesTurn(&o->pose[body = o->placed_in[k]]);
     if (turns)
       HycoPoseTurn(o->pose[body].Q, dim, PETSC_FALSE, own, turned);
     else

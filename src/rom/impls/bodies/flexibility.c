@@ -1,15 +1,16 @@
 /*
-  The flexibility of a body as a polynomial of the parameters that change its shape (hycobodies.h), between its surfaces,
-  or of its modes and unknowns inside under forces on them. The samples are its values at the nodes of a tensor grid;
-  polynomials that are orthonormal on the nodes give its terms, of which the first is constant and the others become
-  small fast. A prediction is limited by reading them: small ones in single precision are half as long, and those without
-  effect are left out.
+  The flexibility of a body as a polynomial of the parameters that change its shape (hycobodies.h), between its
+  surfaces, or of its modes and unknowns inside under forces on them. The samples are its values at the nodes of a
+  tensor grid; polynomials that are orthonormal on the nodes give its terms, of which the first is constant and the
+  others become small fast. A prediction is limited by reading them: small ones in single precision are half as long,
+  and those without effect are left out.
 */
 #include <hycobodies.h>
 #include <petscblaslapack.h>
 
 /* Diagonal of the mean over the samples, square root; 0: an unknown that does not move. */
-static void Scales(const HycoFlexibility *f, PetscInt n_samples, const PetscReal *const sample[], PetscReal scale[])
+static void FlexibilityScales(const HycoFlexibility *f, PetscInt n_samples, const PetscReal *const sample[],
+                              PetscReal scale[])
 {
   for (PetscInt i = 0; i < f->n; i++) {
     PetscReal sum = 0;
@@ -20,8 +21,9 @@ static void Scales(const HycoFlexibility *f, PetscInt n_samples, const PetscReal
 }
 
 /* columns (length x n_samples): of an unknown in all terms. X: length x n_samples. */
-static PetscErrorCode Transform(PetscInt length, PetscInt n_samples, const PetscReal Q[],
-                                const PetscReal *const sample[], PetscInt unknown, PetscReal X[], PetscReal columns[])
+static PetscErrorCode FlexibilityTransform(PetscInt length, PetscInt n_samples, const PetscReal Q[],
+                                           const PetscReal *const sample[], PetscInt unknown, PetscReal X[],
+                                           PetscReal columns[])
 {
   const PetscReal one = 1, zero = 0;
   PetscBLASInt rows, terms;
@@ -50,7 +52,7 @@ static PetscErrorCode TermSizes(const HycoFlexibility *f, PetscInt n_samples, co
   for (PetscInt u = 0; u < f->n; u++) {
     /* It moves in no sample, as where a support holds it. */
     if (!(column_scale[u] > 0)) continue;
-    PetscCall(Transform(f->rows, n_samples, Q, sample, u, X, columns));
+    PetscCall(FlexibilityTransform(f->rows, n_samples, Q, sample, u, X, columns));
     for (PetscInt t = 0; t < n_samples; t++) {
       PetscReal most = 0;
 
@@ -141,7 +143,7 @@ PetscErrorCode HycoFlexibilityCreate(const HycoTensor *tensor, PetscInt rows, Pe
   for (PetscInt t = 0; t < n_samples; t++) f->term[t] = t;
   if (least > 0) {
     if (!scale) PetscCall(PetscMalloc1(n + 1, &diagonal));
-    if (!scale) Scales(f, n_samples, sample, diagonal);
+    if (!scale) FlexibilityScales(f, n_samples, sample, diagonal);
     PetscCall(TermSizes(f, n_samples, Q, sample, scale ? scale : diagonal, scale ? scale + rows : diagonal, size));
     PetscCall(ChooseTerms(f, n_samples, size, least, single));
     PetscCall(PetscFree(diagonal));
@@ -149,7 +151,7 @@ PetscErrorCode HycoFlexibilityCreate(const HycoTensor *tensor, PetscInt rows, Pe
   PetscCall(HycoFlexibilityTakePolynomials(f, tensor));
   PetscCall(HycoFlexibilityAllocate(f));
   for (PetscInt u = 0; u < n; u++) {
-    PetscCall(Transform(rows, n_samples, Q, sample, u, X, columns));
+    PetscCall(FlexibilityTransform(rows, n_samples, Q, sample, u, X, columns));
     for (PetscInt t = 0; t < f->n_terms; t++) {
       for (PetscInt i = 0; i < rows; i++)
         HycoFlexibilitySetEntry(f, t, u, i, columns[(size_t)f->term[t] * (size_t)rows + (size_t)i]);
@@ -168,7 +170,7 @@ PetscErrorCode HycoFlexibilityDestroy(HycoFlexibility *f)
 }
 
 /* The first entry of an unknown's column in a term among `terms` such columns. */
-static size_t At(const HycoFlexibility *f, PetscInt terms, PetscInt t, PetscInt unknown)
+static size_t FlexibilityEntry(const HycoFlexibility *f, PetscInt terms, PetscInt t, PetscInt unknown)
 {
   return ((size_t)unknown * (size_t)terms + (size_t)t) * (size_t)f->rows;
 }
@@ -176,17 +178,17 @@ static size_t At(const HycoFlexibility *f, PetscInt terms, PetscInt t, PetscInt 
 /* Of term t, for loops over single entries, as those of a file. Predictions use whole columns instead. */
 PetscReal HycoFlexibilityEntry(const HycoFlexibility *f, PetscInt t, PetscInt unknown, PetscInt i)
 {
-  if (t < f->n_wide) return f->wide[At(f, f->n_wide, t, unknown) + (size_t)i];
-  return f->narrow[At(f, f->n_terms - f->n_wide, t - f->n_wide, unknown) + (size_t)i];
+  if (t < f->n_wide) return f->wide[FlexibilityEntry(f, f->n_wide, t, unknown) + (size_t)i];
+  return f->narrow[FlexibilityEntry(f, f->n_terms - f->n_wide, t - f->n_wide, unknown) + (size_t)i];
 }
 
 /* A later sum of terms has the rounding of narrow ones to float: the trainings measure errors after it. */
 void HycoFlexibilitySetEntry(HycoFlexibility *f, PetscInt t, PetscInt unknown, PetscInt i, PetscReal value)
 {
   if (t < f->n_wide)
-    f->wide[At(f, f->n_wide, t, unknown) + (size_t)i] = value;
+    f->wide[FlexibilityEntry(f, f->n_wide, t, unknown) + (size_t)i] = value;
   else
-    f->narrow[At(f, f->n_terms - f->n_wide, t - f->n_wide, unknown) + (size_t)i] = (float)value;
+    f->narrow[FlexibilityEntry(f, f->n_terms - f->n_wide, t - f->n_wide, unknown) + (size_t)i] = (float)value;
 }
 
 /* weight: of the samples in the interpolation at a point (Lagrange). Of the polynomials' values at the samples it
@@ -204,16 +206,16 @@ void HycoFlexibilityAdd(const HycoFlexibility *f, PetscInt t, PetscInt unknown, 
 {
   if (t < f->n_wide)
     /* By the same routine as sums of blended columns: with one sample kept products have the same bits. */
-    HycoBodiesAdd(f->rows, factor, f->wide + At(f, f->n_wide, t, unknown), to);
+    HycoBodiesAdd(f->rows, factor, f->wide + FlexibilityEntry(f, f->n_wide, t, unknown), to);
   else {
-    const float *narrow = f->narrow + At(f, f->n_terms - f->n_wide, t - f->n_wide, unknown);
+    const float *narrow = f->narrow + FlexibilityEntry(f, f->n_terms - f->n_wide, t - f->n_wide, unknown);
 
     for (PetscInt i = 0; i < f->rows; i++) to[i] += factor * narrow[i];
   }
 }
 
-/* to[n] += the sum over `terms` terms of share times from, `stride` apart. Four at a time: `to` is read and written less
-   often. For both precisions in one order, so that sums of kept products and of columns have the same bits. */
+/* to[n] += the sum over `terms` terms of share times from, `stride` apart. Four at a time: `to` is read and written
+   less often. For both precisions in one order, so that sums of kept products and of columns have the same bits. */
 #define ADD_TERMS(name, type)                                                                                          \
   HYCO_FOUR_AT_ONCE static void name(PetscInt terms, const PetscReal share[], size_t n, size_t stride,                 \
                                      const type from[], PetscReal to[])                                                \
@@ -251,8 +253,8 @@ void HycoFlexibilityColumn(const HycoFlexibility *f, const PetscReal share[], Pe
   const size_t n = (size_t)f->rows;
   const PetscInt narrow = f->n_terms - f->n_wide;
 
-  SumWide(f, share, n, n, f->wide + At(f, f->n_wide, 0, unknown), column);
-  AddShortTerms(narrow, share + f->n_wide, n, n, f->narrow + At(f, narrow, 0, unknown), column);
+  SumWide(f, share, n, n, f->wide + FlexibilityEntry(f, f->n_wide, 0, unknown), column);
+  AddShortTerms(narrow, share + f->n_wide, n, n, f->narrow + FlexibilityEntry(f, narrow, 0, unknown), column);
 }
 
 void HycoFlexibilityBlend(const HycoFlexibility *f, const PetscReal share[], PetscInt n, size_t stride,
@@ -262,8 +264,8 @@ void HycoFlexibilityBlend(const HycoFlexibility *f, const PetscReal share[], Pet
   AddTerms(f->n_terms - f->n_wide, share + f->n_wide, (size_t)n, stride, from + (size_t)f->n_wide * stride, to);
 }
 
-/* Wide columns of a run of unknowns with x are one matrix; x is that of forces, whose runs are a few since contact zones
-   are connected. */
+/* Wide columns of a run of unknowns with x are one matrix; x is that of forces, whose runs are a few since contact
+   zones are connected. */
 PetscErrorCode HycoFlexibilityMultiply(const HycoFlexibility *f, const PetscReal share[], const PetscReal x[],
                                        PetscReal y[])
 {
@@ -283,12 +285,13 @@ PetscErrorCode HycoFlexibilityMultiply(const HycoFlexibility *f, const PetscReal
     PetscCall(PetscBLASIntCast((end - d) * f->n_wide, &columns));
     /* An unknown without a force ends a run at once. */
     if (columns)
-      BLASgemv_("N", &rows, &columns, &one, f->wide + At(f, f->n_wide, 0, d), &rows, factor, &each, &one, y, &each);
+      BLASgemv_("N", &rows, &columns, &one, f->wide + FlexibilityEntry(f, f->n_wide, 0, d), &rows, factor, &each, &one,
+                y, &each);
   }
   for (PetscInt d = 0; d < f->n && narrow; d++) {
     if (x[d] == 0) continue;
     for (PetscInt t = 0; t < narrow; t++) factor[t] = share[f->n_wide + t] * x[d];
-    AddShortTerms(narrow, factor, (size_t)f->rows, (size_t)f->rows, f->narrow + At(f, narrow, 0, d), y);
+    AddShortTerms(narrow, factor, (size_t)f->rows, (size_t)f->rows, f->narrow + FlexibilityEntry(f, narrow, 0, d), y);
   }
   PetscCall(PetscFree(factor));
   PetscFunctionReturn(PETSC_SUCCESS);

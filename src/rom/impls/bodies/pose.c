@@ -91,7 +91,9 @@ void HycoPoseFit(PetscInt dim, PetscInt n, const PetscReal X[], const PetscReal 
 }
 
 /* Three passes because second moments need the centres, and distances the map. Each pass reduces over ranks, so that
-   every rank makes the same pose from the same sums; a node counts once, on its owner. The pose is the orthogonal factor and the mean scale of the affine map that fits the mapped nodes best by least squares; its residual tells how far the map is from turning and scaling. */
+   every rank makes the same pose from the same sums; a node counts once, on its owner. The pose is the orthogonal
+   factor and the mean scale of the affine map that fits the mapped nodes best by least squares; its residual tells how
+   far the map is from turning and scaling. */
 PetscErrorCode HycoBodyPoses(HycoFOM f, PetscInt n, const PetscInt of[], const PetscReal X0[], HycoPose pose[])
 {
   const PetscInt dim = f->fe->dim, width = (PetscInt)(sizeof(Moments) / sizeof(PetscReal));

@@ -95,7 +95,7 @@ static PetscErrorCode CreateReduced(PetscInt rows, PetscInt cols, PetscBool dens
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Everything whose size does not depend on parameters; the first Assemble() makes the matrices' patterns. */
+/* Everything whose size does not depend on parameters; the first GalerkinAssemble() makes the matrices' patterns. */
 PetscErrorCode HycoGalerkinSetUp(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -162,7 +162,7 @@ PetscErrorCode HycoGalerkinDestroy(HycoGalerkinModel g)
 }
 
 /* Only what the new parameters change; `ready` is false meanwhile, so that an error leaves nothing that looks valid. */
-static PetscErrorCode Assemble(HycoROM m, const PetscReal mu[])
+static PetscErrorCode GalerkinAssemble(HycoROM m, const PetscReal mu[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
   PetscBool first = PETSC_FALSE;
@@ -205,7 +205,7 @@ PetscErrorCode HycoGalerkinAssemble(HycoROM m, const PetscReal mu[])
   PetscFunctionBegin;
   PetscCall(HycoROMSetUp(m));
   m->solved = m->whole_current = PETSC_FALSE;
-  PetscCall(Assemble(m, mu));
+  PetscCall(GalerkinAssemble(m, mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -273,7 +273,7 @@ PetscErrorCode HycoGalerkinSolve(HycoROM m, const PetscReal mu[])
     PetscCall(HycoGalerkinPathSolve(m, mu));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(Assemble(m, mu));
+  PetscCall(GalerkinAssemble(m, mu));
   p->seconds.assemble = HycoNow() - begin;
   /* Before the solve: the solution without contact comes from the table of loads, if it is affine in them. */
   HycoLogged(HYCO_EVENT_SOLVE, HycoLoadsSetFree(m, mu));

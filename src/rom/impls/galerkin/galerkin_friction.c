@@ -110,9 +110,9 @@ static PetscErrorCode IsTested(HycoGalerkin g, PetscInt begin, PetscInt end, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rows of A_lambda at fe's parameters: B is constant along a path, gaps of tangents change with each step. A tangent
-   that acts on no unknown of A (the slave held along it, its masters on the interface) is made empty, and carries no
-   friction. Rows are packed in place, from the front. */
+/* The rows of A_lambda at fe's parameters: B is constant along a path, gaps of tangents change with each step. A
+   tangent that acts on no unknown of A (the slave held along it, its masters on the interface) is made empty, and
+   carries no friction. Rows are packed in place, from the front. */
 PetscErrorCode HycoGalerkinFrictionRows(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -142,7 +142,7 @@ PetscErrorCode HycoGalerkinFrictionRows(HycoROM m)
 }
 
 /* The cones with the coefficients of the step, and its other start. */
-PetscErrorCode HycoGalerkinFrictionPose(HycoROM m)
+PetscErrorCode HycoGalerkinFrictionSetCones(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
   HycoGalerkinFriction f = g->friction;
@@ -177,7 +177,7 @@ static PetscErrorCode TakeMultipliers(HycoROM m)
 }
 
 /* Bodies that contact alone holds: each contact's force is scaled as a whole, and stays in its cone. */
-static PetscErrorCode Balance(HycoROM m)
+static PetscErrorCode GalerkinFrictionBalance(HycoROM m)
 {
   HycoGalerkinFriction f = ((HycoGalerkin)m->work)->friction;
 
@@ -213,9 +213,9 @@ static PetscErrorCode ComputeSlips(HycoROM m, HycoFE fe, PetscReal *most)
 }
 
 /* Coulomb's law for the tangential part of a reconstructed force, of n components: where r - rho w is outside the cone,
-   the contact slips, and the force is on the cone. Elsewhere it sticks, and a slip that would do negative work is an error of
-   the modes. */
-static void Slip(PetscReal mu, PetscReal rho, PetscInt n, PetscReal force[], PetscReal slack[])
+   the contact slips, and the force is on the cone. Elsewhere it sticks, and a slip that would do negative work is an
+   error of the modes. */
+static void GalerkinFrictionSlip(PetscReal mu, PetscReal rho, PetscInt n, PetscReal force[], PetscReal slack[])
 {
   const PetscReal data[2] = {mu, 0};
   PetscReal y[3] = {force[0]}, work = 0;
@@ -227,7 +227,7 @@ static void Slip(PetscReal mu, PetscReal rho, PetscInt n, PetscReal force[], Pet
 }
 
 /* The law outside the RID, with a rho that makes the largest force and displacement equally large. */
-static void Obey(HycoROM m, PetscReal most)
+static void GalerkinFrictionApplyLaw(HycoROM m, PetscReal most)
 {
   HycoGalerkinFriction f = ((HycoGalerkin)m->work)->friction;
   PetscReal force = 0;
@@ -237,7 +237,7 @@ static void Obey(HycoROM m, PetscReal most)
     const PetscInt begin = f->all.row[k];
 
     if (!m->model->in_rid[k])
-      Slip(f->all.mu[k], force / most, f->all.row[k + 1] - begin, f->force + begin, f->slack + begin);
+      GalerkinFrictionSlip(f->all.mu[k], force / most, f->all.row[k + 1] - begin, f->force + begin, f->slack + begin);
   }
 }
 
@@ -256,15 +256,16 @@ PetscErrorCode HycoGalerkinFrictionAccept(HycoROM m, HycoPath p)
   PetscCall(TakeMultipliers(m));
   if (m->ops->reconstruct && m->reconstruct) HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
   PetscCall(ComputeSlips(m, fe, &most));
-  Obey(m, most);
-  PetscCall(Balance(m));
+  GalerkinFrictionApplyLaw(m, most);
+  PetscCall(GalerkinFrictionBalance(m));
   HycoSlipAdd(&f->all, f->force, f->slack, most);
   HycoSlipTake(&f->own, p->t);
   p->now.disproven += m->n_L && m->solver->sign < 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The forces of the last accepted time, which is recorded with the displacements there: an attempt after it may have left others. */
+/* The forces of the last accepted time, which is recorded with the displacements there: an attempt after it may have
+   left others. */
 PetscErrorCode HycoGalerkinFrictionShow(HycoROM m)
 {
   HycoGalerkinFriction f = ((HycoGalerkin)m->work)->friction;

@@ -21,8 +21,9 @@ struct _n_HycoGalerkinPath {
   PetscBool moved;        /* the attempt's prescribed displacements are in U */
 };
 
-/* K and Kr. The first one is assembled again as in later assemblies, so that the sums have the same bits. Called when the path needs a new linear part. */
-static PetscErrorCode Stiffness(HycoPath p)
+/* K and Kr. The first one is assembled again as in later assemblies, so that the sums have the same bits. Called when
+   the path needs a new linear part. */
+static PetscErrorCode GalerkinPathStiffness(HycoPath p)
 {
   HycoROM m = (HycoROM)p->ctx;
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -35,7 +36,7 @@ static PetscErrorCode Stiffness(HycoPath p)
 }
 
 /* The loads only, without the effect of moved supports. */
-static PetscErrorCode Loads(HycoPath p)
+static PetscErrorCode GalerkinPathLoads(HycoPath p)
 {
   HycoROM m = (HycoROM)p->ctx;
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -51,9 +52,10 @@ static PetscErrorCode Loads(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Brings the reduced system to the parameters of a time. What did not change is kept: the linear cells' stiffness, the rows
-   of B, the loads. Until all is current, fe->ready is false, so that an error leaves no half-assembled system in use. */
-static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elastic)
+/* Brings the reduced system to the parameters of a time. What did not change is kept: the linear cells' stiffness, the
+   rows of B, the loads. Until all is current, fe->ready is false, so that an error leaves no half-assembled system in
+   use. */
+static PetscErrorCode GalerkinPathAssemble(HycoPath p, const PetscReal mu[], PetscBool elastic)
 {
   HycoROM m = (HycoROM)p->ctx;
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -66,23 +68,24 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
   g->path->moved = PETSC_FALSE;
   m->beyond_current = PETSC_FALSE;
   /* Later stiffnesses are tangents, which Newton's method assembles with the laws' states. */
-  if (fe->stiffness_changed && (elastic || !p->n_taken)) PetscCall(Stiffness(p)); /* the first is the elastic one */
+  if (fe->stiffness_changed && (elastic || !p->n_taken))
+    PetscCall(GalerkinPathStiffness(p)); /* the first is the elastic one */
   PetscCall(HycoLinearForceSet(g->path->linear, fe->stiffness_changed));
   /* B is filled on demand: a step that only changes gaps keeps it. */
   if (fe->contact_changed) g->current_B = PETSC_FALSE;
   /* With friction at each step: gaps of tangents are the slave's last places. */
   if (fe->contact_changed || fe->gap_changed || g->friction) HycoLogged(HYCO_EVENT_CONTACT, HycoGalerkinOwnRows(m));
   if (m->n_L && fe->contact_changed) HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillContact(m));
-  PetscCall(Loads(p));
+  PetscCall(GalerkinPathLoads(p));
   fe->ready = PETSC_TRUE;
   if (!g->system->K) PetscCall(HycoSystemSetMatrices(g->system, g->Kr, g->Btr, g->Br, g->model->symmetric));
-  if (g->friction) PetscCall(HycoGalerkinFrictionPose(m));
+  if (g->friction) PetscCall(HycoGalerkinFrictionSetCones(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* U of the iteration in path->u: the supports have their values of the last accepted time until the first contact
    system of the step has moved them. */
-static PetscErrorCode Displace(HycoROM m)
+static PetscErrorCode GalerkinPathDisplace(HycoROM m)
 {
   HycoGalerkinPath q = ((HycoGalerkin)m->work)->path;
 
@@ -101,13 +104,14 @@ static PetscErrorCode Displace(HycoROM m)
 
 /* Residual and, on request, consistent tangent of a time step: the laws of the cells that flow, plus the linear cells'
    forces by their constant matrix, tested with the modes. */
-static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tangent, HycoFEStepReport *report)
+static PetscErrorCode GalerkinPathStep(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tangent,
+                                       HycoFEStepReport *report)
 {
   HycoROM m = (HycoROM)p->ctx;
   HycoGalerkinPath q = ((HycoGalerkin)m->work)->path;
 
   PetscFunctionBegin;
-  PetscCall(Displace(m));
+  PetscCall(GalerkinPathDisplace(m));
   PetscCall(PetscArrayzero(p->f_local, m->fe->n_dof));
   PetscCall(HycoFEStepBodies(m->fe, HYCO_BODIES_FLOWING, q->u, t0, t1, p->begin, p->end, p->f_local, tangent, report));
   /* A sum over some cells with test functions of the modes is no gradient of an energy: no line search on it. */
@@ -123,7 +127,7 @@ static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tan
 
 /* Adds the effect of supports that move in this step to the right-hand side. The loads alone are subtracted, because
    HycoPathMoves() adds to them. */
-static PetscErrorCode Moves(HycoPath p, Vec rhs)
+static PetscErrorCode GalerkinPathMoveSupports(HycoPath p, Vec rhs)
 {
   HycoROM m = (HycoROM)p->ctx;
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -145,7 +149,7 @@ static PetscErrorCode Moves(HycoPath p, Vec rhs)
 
 /* After an accepted step: the prescribed displacements become the held ones, and the displacements enter the trace from
    which states are replayed. */
-static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
+static PetscErrorCode GalerkinPathAccept(HycoPath p, const HycoStepAttempt *a)
 {
   HycoROM m = (HycoROM)p->ctx;
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -174,7 +178,7 @@ static PetscErrorCode CompleteState(HycoROM m, HycoPath p)
 }
 
 /* Called before listed time k: if its tangent is monitored, it must be the current one. */
-static void Expect(HycoROM m, PetscInt k)
+static void GalerkinPathRefreshTangent(HycoROM m, PetscInt k)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
   const PetscBool watched = (PetscBool)(g->watch.stride && k % g->watch.stride == 0);
@@ -183,7 +187,7 @@ static void Expect(HycoROM m, PetscInt k)
 }
 
 /* Monitors the last tangent: whether the path comes close to a singular one. */
-static PetscErrorCode Watch(HycoROM m, PetscInt k)
+static PetscErrorCode GalerkinPathMonitorTangent(HycoROM m, PetscInt k)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
   Mat dense;
@@ -191,7 +195,7 @@ static PetscErrorCode Watch(HycoROM m, PetscInt k)
   PetscInt sign;
 
   PetscFunctionBegin;
-  Expect(m, k + 1);
+  GalerkinPathRefreshTangent(m, k + 1);
   /* Not at each time: an SVD per listed time would double the cost of a training path. */
   if (!g->watch.stride || k % g->watch.stride) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatConvert(g->Kr, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
@@ -204,13 +208,13 @@ static PetscErrorCode Watch(HycoROM m, PetscInt k)
 }
 
 /* A listed time: completes what the getters return there and stores it, since the next step overwrites it. */
-static PetscErrorCode Record(HycoPath p)
+static PetscErrorCode GalerkinPathRecord(HycoPath p)
 {
   HycoROM m = (HycoROM)p->ctx;
   HycoGalerkin g = (HycoGalerkin)m->work;
 
   PetscFunctionBegin;
-  PetscCall(Watch(m, p->n_steps));
+  PetscCall(GalerkinPathMonitorTangent(m, p->n_steps));
   PetscCall(HycoGalerkinUnpack(m));
   if (g->friction) PetscCall(HycoGalerkinFrictionShow(m));
   PetscCall(HycoGalerkinCheckContactBasis(m));
@@ -227,8 +231,8 @@ static PetscErrorCode Record(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The constant matrix of the cells without history. Only rows of A are tested, but the forces of tied nodes are passed to
-   their masters afterwards, so those rows are needed too. */
+/* The constant matrix of the cells without history. Only rows of A are tested, but the forces of tied nodes are passed
+   to their masters afterwards, so those rows are needed too. */
 static PetscErrorCode CreateLinear(HycoROM m)
 {
   HycoMesh mesh = m->fe->mesh;
@@ -251,8 +255,12 @@ static PetscErrorCode CreateLinear(HycoROM m)
 /* The path borrows matrices and vectors of the Galerkin work, and only adds the history's own state. */
 PetscErrorCode HycoGalerkinPathCreate(HycoROM m)
 {
-  static const HycoPathOps ops = {
-      .assemble = Assemble, .step = Step, .stiffness = Stiffness, .moves = Moves, .accept = Accept, .record = Record};
+  static const HycoPathOps ops = {.assemble = GalerkinPathAssemble,
+                                  .step = GalerkinPathStep,
+                                  .stiffness = GalerkinPathStiffness,
+                                  .moves = GalerkinPathMoveSupports,
+                                  .accept = GalerkinPathAccept,
+                                  .record = GalerkinPathRecord};
   HycoGalerkin g = (HycoGalerkin)m->work;
   HycoPath p;
 
@@ -277,7 +285,7 @@ PetscErrorCode HycoGalerkinPathCreate(HycoROM m)
   p->D = g->Dr;
   p->n_contacts = m->n_L;
   p->n_free = m->n;
-  p->rubs = (PetscBool)(g->friction && m->n_L);
+  p->has_friction = (PetscBool)(g->friction && m->n_L);
   PetscCall(HycoPathSetUp(p));
   /* Newton's next iteration corrects what a refinement would. */
   PetscCall(HycoSolverSetRefine(m->solver, PETSC_FALSE));
@@ -304,7 +312,7 @@ PetscErrorCode HycoGalerkinPathSolve(HycoROM m, const PetscReal mu[])
   const char *method;
 
   PetscFunctionBegin;
-  Expect(m, 0);
+  GalerkinPathRefreshTangent(m, 0);
   PetscCall(PetscArrayzero(q->held, m->fe->n_dof));
   if (((HycoGalerkin)m->work)->friction) PetscCall(HycoGalerkinFrictionBegin(m));
   PetscCall(HycoTraceFollow(m, q->path, mu));

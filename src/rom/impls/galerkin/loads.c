@@ -71,7 +71,7 @@ void HycoLoadsForget(HycoLoads loads)
 }
 
 /* y = v_0 + sum_j t_j v_j */
-static PetscErrorCode Sum(HycoLoads p, const Vec v[], const PetscReal t[], Vec y)
+static PetscErrorCode LoadsSum(HycoLoads p, const Vec v[], const PetscReal t[], Vec y)
 {
   PetscFunctionBegin;
   PetscCall(VecCopy(v[0], y));
@@ -83,7 +83,7 @@ static PetscErrorCode Sum(HycoLoads p, const Vec v[], const PetscReal t[], Vec y
 
 /* The loads are affine in the parameters: 1 and each parameter's place between the ends of its range. Between 0 and 1,
    so that coefficients of different parameters are of one size. */
-static void Coordinates(HycoROM m, const PetscReal mu[], PetscReal t[])
+static void LoadsCoordinates(HycoROM m, const PetscReal mu[], PetscReal t[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
   const HycoLoads p = g->loads;
@@ -105,7 +105,7 @@ static PetscErrorCode IsSum(HycoROM m, const PetscReal t[], PetscBool *is)
 
   PetscFunctionBegin;
   PetscCall(VecNorm(g->Fr, NORM_INFINITY, &size));
-  PetscCall(Sum(p, p->F, t, p->sum));
+  PetscCall(LoadsSum(p, p->F, t, p->sum));
   PetscCall(VecAXPY(p->sum, -1, g->Fr));
   PetscCall(VecNorm(p->sum, NORM_INFINITY, &apart));
   /* Tested on the assembled vector at each mu: an expression may be affine at the middle by chance and not
@@ -151,16 +151,16 @@ static PetscErrorCode SampleForces(HycoROM m, const PetscReal mu[])
   for (PetscInt j = 0; j < p->n; j++)
     at[p->parameter[j]] = 0.5 * m->model->scene->lo[p->parameter[j]] + 0.5 * m->model->scene->hi[p->parameter[j]];
   PetscCall(ForceAt(m, at));
-  Coordinates(m, at, t);
+  LoadsCoordinates(m, at, t);
   PetscCall(IsSum(m, t, &p->affine));
   /* Back at the caller's point, whose right-hand side is solved next. */
   PetscCall(ForceAt(m, mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves K x = F anew at the corners of the loads' ranges, for a stiffness that has changed. Forces that the corner solves
-   left at other parameters make the assembly not current. */
-static PetscErrorCode Renew(HycoROM m, const PetscReal mu[])
+/* Solves K x = F anew at the corners of the loads' ranges, for a stiffness that has changed. Forces that the corner
+   solves left at other parameters make the assembly not current. */
+static PetscErrorCode LoadsRenew(HycoROM m, const PetscReal mu[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
   const HycoLoads p = g->loads;
@@ -197,12 +197,12 @@ PetscErrorCode HycoLoadsSetFree(HycoROM m, const PetscReal mu[])
   if (!p) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSolverSetFree(m->solver, NULL));
   /* The first prediction with this stiffness pays a solve for each load; the later ones of a ramp none. */
-  if (!p->current) PetscCall(Renew(m, mu));
+  if (!p->current) PetscCall(LoadsRenew(m, mu));
   if (!p->affine) PetscFunctionReturn(PETSC_SUCCESS);
-  Coordinates(m, mu, t);
+  LoadsCoordinates(m, mu, t);
   PetscCall(IsSum(m, t, &is));
   if (!is) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Sum(p, p->X, t, p->sum));
+  PetscCall(LoadsSum(p, p->X, t, p->sum));
   PetscCall(HycoSolverSetFree(m->solver, p->sum));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

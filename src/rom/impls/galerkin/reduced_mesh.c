@@ -155,8 +155,8 @@ static PetscErrorCode CreateContactSets(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* B on the RID's unknowns, with room for the masters that a slave may meet while surfaces move; rows of contacts outside
-   A_lambda are empty. at: the row of B for each of own_rows. */
+/* B on the RID's unknowns, with room for the masters that a slave may meet while surfaces move; rows of contacts
+   outside A_lambda are empty. at: the row of B for each of own_rows. */
 static PetscErrorCode CreateContactMatrix(HycoROM m, PetscInt n_own, const PetscInt at[], Mat *B)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;

@@ -245,7 +245,7 @@ static PetscErrorCode CreateRows(HycoROM m, IS in, PetscErrorCode (*of)(IS, IS, 
 }
 
 /* The submatrices of K on these rows, and their products. */
-static PetscErrorCode Multiply(HycoROM m, MatReuse reuse, Rows *s)
+static PetscErrorCode ReducedSystemMultiply(HycoROM m, MatReuse reuse, Rows *s)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
   HycoReduced r = g->reduced;
@@ -346,7 +346,7 @@ static PetscErrorCode PutModes(HycoROM m)
 }
 
 /* Room for a sparse Kr: full rows of the modes; the modes and the neighbours in the others. */
-static PetscErrorCode Preallocate(HycoROM m)
+static PetscErrorCode ReducedSystemPreallocate(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
   PetscInt *n;
@@ -366,7 +366,7 @@ static PetscErrorCode Preallocate(HycoROM m)
 }
 
 /* The first time: the rows, and what those that no parameter changes contribute to Kr. */
-static PetscErrorCode Start(HycoROM m)
+static PetscErrorCode ReducedSystemStart(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
   HycoReduced r = g->reduced;
@@ -385,12 +385,12 @@ static PetscErrorCode Start(HycoROM m)
     PetscCall(CreateRows(m, r->all, ISIntersect, &r->varying));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (!r->dense) PetscCall(Preallocate(m));
+  if (!r->dense) PetscCall(ReducedSystemPreallocate(m));
   PetscCall(CreateRows(m, varying, ISIntersect, &r->varying));
   PetscCall(CreateRows(m, varying, ISDifference, &constant));
   PetscCall(ISDestroy(&varying));
   /* Once: what no parameter changes is a constant l x l block and constant rows. */
-  PetscCall(Multiply(m, MAT_INITIAL_MATRIX, &constant));
+  PetscCall(ReducedSystemMultiply(m, MAT_INITIAL_MATRIX, &constant));
   PetscCall(PutFull(m, &constant));
   r->constant = constant.M;
   constant.M = NULL;
@@ -431,8 +431,8 @@ PetscErrorCode HycoReducedFillStiffness(HycoROM m)
   PetscFunctionBegin;
   PetscCall(HycoReducedPrepare(m));
   r = g->reduced;
-  if (!r->filled) PetscCall(Start(m));
-  PetscCall(Multiply(m, r->filled ? MAT_REUSE_MATRIX : MAT_INITIAL_MATRIX, &r->varying));
+  if (!r->filled) PetscCall(ReducedSystemStart(m));
+  PetscCall(ReducedSystemMultiply(m, r->filled ? MAT_REUSE_MATRIX : MAT_INITIAL_MATRIX, &r->varying));
   /* Otherwise row by row, since Kr may be sparse. */
   if (r->all_full)
     PetscCall(PutAll(m));

@@ -22,7 +22,7 @@ static PetscErrorCode SetFromOptions(HycoROM m)
 }
 
 /* The reconstruction is that of the mesh and the pairs of this set-up, and is made anew with the next one. */
-static PetscErrorCode Reset(HycoROM m)
+static PetscErrorCode HybridReset(HycoROM m)
 {
   PetscFunctionBegin;
   PetscCall(HycoReconstructionDestroy(&((HycoHybridWork)m->work)->reconstruction));
@@ -32,7 +32,7 @@ static PetscErrorCode Reset(HycoROM m)
 
 /* Prints the RID, its full-order displacements, and the data of the reconstruction. Numbers of other modes are those of
    training; they seed the RID and are not part of the model. */
-static PetscErrorCode View(HycoROM m, PetscViewer viewer)
+static PetscErrorCode HybridView(HycoROM m, PetscViewer viewer)
 {
   static const char *const words[] = {"auto", "rank: the fewest that give full row rank",
                                       "contact: all on the contact surfaces of the RID",
@@ -65,7 +65,7 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 
 /* Writes to the model file, or reads from it. Writes or reads, by the file's direction. -1: the number of snapshots is
    taken from the file. */
-static PetscErrorCode Move(HycoROM m, HycoH5 file)
+static PetscErrorCode HybridMove(HycoROM m, HycoH5 file)
 {
   HycoHybridModel h = (HycoHybridModel)m->model->data;
 
@@ -79,7 +79,7 @@ static PetscErrorCode Move(HycoROM m, HycoH5 file)
 }
 
 /* The type's own data last: the common part of the Galerkin models refers to it. */
-static PetscErrorCode Destroy(HycoROM m)
+static PetscErrorCode HybridDestroy(HycoROM m)
 {
   HycoHybridModel h = (HycoHybridModel)m->model->data;
 
@@ -104,7 +104,7 @@ PetscErrorCode HycoROMCreate_Hybrid(HycoROM m)
                                        .integrals = PETSC_TRUE};
   static const HycoROMOps ops = {.options = SetFromOptions,
                                  .setup = HycoGalerkinSetUp,
-                                 .reset = Reset,
+                                 .reset = HybridReset,
                                  .solve = HycoGalerkinSolve,
                                  .unknowns = HycoGalerkinUnknowns,
                                  .residual = HycoGalerkinResidual,
@@ -114,10 +114,10 @@ PetscErrorCode HycoROMCreate_Hybrid(HycoROM m)
                                  .energy = HycoGalerkinEnergy,
                                  .condition = HycoGalerkinCondition,
                                  .local = HycoGalerkinLocal,
-                                 .view = View,
-                                 .save = Move,
-                                 .load = Move,
-                                 .destroy = Destroy};
+                                 .view = HybridView,
+                                 .save = HybridMove,
+                                 .load = HybridMove,
+                                 .destroy = HybridDestroy};
   HycoHybridModel h;
 
   PetscFunctionBegin;

@@ -16,8 +16,8 @@ enum { SOLVER_AUTO, SOLVER_NNLS, SOLVER_TAO };
 
 /* Explicit least squares: Lawson and Hanson's active set method, or TAO; with auto or tao the other one if the first
    does not converge. */
-static PetscErrorCode Solve(PetscInt solver, PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[],
-                            PetscReal c[])
+static PetscErrorCode ReconstructSolve(PetscInt solver, PetscInt m, PetscInt n, const PetscReal A[],
+                                       const PetscReal b[], PetscReal c[])
 {
   PetscBool solved = PETSC_FALSE;
 
@@ -46,7 +46,7 @@ struct _n_HycoReconstruction {
 };
 
 /* The forces by row, and the first row of each contact (NULL: a row is a contact). */
-static PetscReal *Forces(HycoROM m, const PetscInt **first)
+static PetscReal *ReconstructForces(HycoROM m, const PetscInt **first)
 {
   HycoGalerkinFriction friction = ((HycoHybridWork)m->work)->galerkin.friction;
   PetscReal *force = m->Lambda;
@@ -55,8 +55,8 @@ static PetscReal *Forces(HycoROM m, const PetscInt **first)
   return force;
 }
 
-/* Keeps the contacts that have a force in some dual snapshot: (41) can give no force to others. S is repacked by those rows.
-   The shift, the square of a small force, keeps the normal equations definite where snapshots are dependent. */
+/* Keeps the contacts that have a force in some dual snapshot: (41) can give no force to others. S is repacked by those
+   rows. The shift, the square of a small force, keeps the normal equations definite where snapshots are dependent. */
 static PetscErrorCode SetUp(HycoROM m)
 {
   const HycoHybridModel h = (HycoHybridModel)m->model->data;
@@ -67,7 +67,7 @@ static PetscErrorCode SetUp(HycoROM m)
   PetscFunctionBegin;
   PetscCall(PetscNew(&r));
   ((HycoHybridWork)m->work)->reconstruction = r;
-  (void)Forces(m, &first);
+  (void)ReconstructForces(m, &first);
   if (first) N = first[N];
   PetscCall(PetscMalloc1(N, &r->contact));
   PetscCall(PetscMalloc1(N, &r->row));
@@ -140,13 +140,13 @@ static PetscErrorCode SolveWrittenOut(HycoROM m, const PetscReal L[])
     /* The small weight on each coefficient, a row each. */
     a[row + j] = SMALL * r->scale;
   }
-  PetscCall(Solve(h->reconstruct_solver, rows, n, A, b, r->c));
+  PetscCall(ReconstructSolve(h->reconstruct_solver, rows, n, A, b, r->c));
   PetscCall(PetscFree2(A, b));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The difference of the combination's forces in the RID from the multipliers there, relative to these. */
-static PetscReal Remainder(HycoROM m, const PetscReal L[], const HycoReconstruction r, PetscInt n_dual)
+static PetscReal ReconstructRemainder(HycoROM m, const PetscReal L[], const HycoReconstruction r, PetscInt n_dual)
 {
   PetscReal lost = 0, size = 0;
 
@@ -170,7 +170,7 @@ PetscErrorCode HycoHybridReconstruct(HycoROM m)
 {
   const HycoHybridModel h = (HycoHybridModel)m->model->data;
   const PetscInt N = m->model->pairs.n, *first;
-  PetscReal force = 0, *L = Forces(m, &first);
+  PetscReal force = 0, *L = ReconstructForces(m, &first);
   HycoReconstruction r;
   PetscBool solved = PETSC_FALSE;
 
@@ -193,7 +193,7 @@ PetscErrorCode HycoHybridReconstruct(HycoROM m)
   if (h->reconstruct_solver != SOLVER_TAO && r->scale > 0)
     PetscCall(HycoWeightedNNLS(r->weighted, r->d, r->h, RTOL, r->c, &solved));
   if (!solved) PetscCall(SolveWrittenOut(m, L));
-  m->remainder = PetscMax(m->remainder, Remainder(m, L, r, h->n_dual));
+  m->remainder = PetscMax(m->remainder, ReconstructRemainder(m, L, r, h->n_dual));
   for (PetscInt j = 0; j < h->n_dual; j++) {
     const PetscReal *s = r->S + (size_t)j * (size_t)r->n;
 

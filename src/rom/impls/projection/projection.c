@@ -126,7 +126,7 @@ static PetscErrorCode FillGap(HycoROM m)
 }
 
 /* Lambda = V_lambda Lambda_r. Adds, since HycoGalerkinUnpack() has cleared Lambda. */
-static PetscErrorCode Expand(HycoROM m)
+static PetscErrorCode ProjectionExpand(HycoROM m)
 {
   HycoProjectionModel p = (HycoProjectionModel)m->model->data;
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -161,7 +161,7 @@ PetscErrorCode HycoProjectionViewForces(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode View(HycoROM m, PetscViewer viewer)
+static PetscErrorCode ProjectionView(HycoROM m, PetscViewer viewer)
 {
   PetscFunctionBegin;
   PetscCall(PetscViewerASCIIPrintf(viewer, "  on the whole mesh: %d elements, %d nodes, %d contacts\n",
@@ -203,7 +203,7 @@ PetscErrorCode HycoProjectionMove(HycoROM m, HycoH5 h)
 }
 
 /* Files of cubature models may have fe; a projection-based one has more forces than modes with it. */
-static PetscErrorCode Load(HycoROM m, HycoH5 h)
+static PetscErrorCode ProjectionLoad(HycoROM m, HycoH5 h)
 {
   PetscFunctionBegin;
   PetscCall(HycoProjectionMove(m, h));
@@ -227,7 +227,7 @@ void HycoProjectionInit(HycoProjectionModel p)
 {
   p->galerkin.contact = FillContact;
   p->galerkin.gap = FillGap;
-  p->galerkin.expand = Expand;
+  p->galerkin.expand = ProjectionExpand;
   p->galerkin.symmetric = PETSC_TRUE;
 }
 
@@ -253,9 +253,9 @@ PetscErrorCode HycoROMCreate_Projection(HycoROM m)
                                  .energy = HycoGalerkinEnergy,
                                  .condition = HycoGalerkinCondition,
                                  .local = HycoGalerkinLocal,
-                                 .view = View,
+                                 .view = ProjectionView,
                                  .save = HycoProjectionMove,
-                                 .load = Load,
+                                 .load = ProjectionLoad,
                                  .destroy = HycoProjectionDestroy};
   HycoProjectionModel p;
 

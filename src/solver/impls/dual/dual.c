@@ -21,7 +21,8 @@ typedef struct {
 } Dual;
 
 /* The usual form: one factorisation, then a dense problem. Cost 2: others are cheaper only for many contacts. */
-static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
+static PetscErrorCode DualAccepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost,
+                                  char why[HYCO_LINE])
 {
   HycoSystem y = s->system;
   PetscInt p;
@@ -59,7 +60,7 @@ static PetscErrorCode EstimateFactor(HycoSolver s, HycoSolverForm form, PetscRea
 }
 
 /* Allocates for m contacts and p pinned unknowns; a change drops the last solution's set. */
-static PetscErrorCode Resize(Dual *d, PetscInt m, PetscInt p)
+static PetscErrorCode DualResize(Dual *d, PetscInt m, PetscInt p)
 {
   const PetscInt n = m + p;
 
@@ -86,7 +87,7 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
   PetscFunctionBegin;
   PetscCall(HycoSystemPinned(y, &p));
   if (!d->S || d->m != y->m || d->p != p) {
-    PetscCall(Resize(d, y->m, p));
+    PetscCall(DualResize(d, y->m, p));
     /* S has to be computed into the new array, thus K factored again, even if it is unchanged. */
     s->stiffness.of.K = 0;
   }
@@ -126,9 +127,9 @@ static PetscErrorCode FreeGap(HycoSolver s, const Dual *d, Vec x)
 
 /* Whether the contacts of the last solution's set prevent all motions that the supports leave: where contacts travel,
    some may have no master any more, and a start from such a set would be singular. G, the rows of the motions, stands
-   in the first p columns of S. By Cholesky's pivots of G^T G over the set, relative to the motions' squared lengths over
-   all contacts, which have the same unit. */
-static PetscErrorCode Holds(const Dual *d, PetscBool *holds)
+   in the first p columns of S. By Cholesky's pivots of G^T G over the set, relative to the motions' squared lengths
+   over all contacts, which have the same unit. */
+static PetscErrorCode DualHolds(const Dual *d, PetscBool *holds)
 {
   const size_t n = (size_t)(d->p + d->m), p = (size_t)d->p;
   PetscReal *gram, *all;
@@ -168,7 +169,7 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *s
   PetscFunctionBegin;
   if (d->p) HycoFormat(name, "dual, %d rigid motions held by contact", (int)d->p);
   PetscCall(HycoSolverNameMethod(s, name));
-  if (s->warm && d->started && d->p) PetscCall(Holds(d, &d->started));
+  if (s->warm && d->started && d->p) PetscCall(DualHolds(d, &d->started));
   /* A cold start: no contact closed, or all for floating bodies, which are otherwise singular. */
   for (PetscInt i = 0; i < d->m && (!s->warm || !d->started); i++) d->active[i] = (PetscBool)(d->p > 0);
   /* At each attempt: a fallback uses another method with the same object. */
@@ -235,7 +236,7 @@ static PetscErrorCode AddForces(HycoSolver s, Vec x, Vec L)
 }
 
 /* x = K^-1 (F - Bt L) */
-static PetscErrorCode Recover(HycoSolver s, const Dual *d, Vec x, Vec L)
+static PetscErrorCode DualRecover(HycoSolver s, const Dual *d, Vec x, Vec L)
 {
   HycoSystem y = s->system;
 
@@ -260,7 +261,7 @@ static PetscErrorCode Recover(HycoSolver s, const Dual *d, Vec x, Vec L)
 }
 
 /* Changes the forces by dL (m), and x accordingly. Linear: no contact problem is solved again. */
-static PetscErrorCode Shift(HycoSolver s, const PetscReal dL[], Vec x, Vec L)
+static PetscErrorCode DualShift(HycoSolver s, const PetscReal dL[], Vec x, Vec L)
 {
   Vec change, force, move;
   PetscInt lo, hi;
@@ -308,7 +309,7 @@ static PetscErrorCode CloseGaps(HycoSolver s, const Dual *d, Vec x, Vec L)
   if (open > 1e-10 * size) PetscCall(HycoLCPSolveOnSet(d->m, d->S, d->g, y->symmetric, NULL, &k, a, change, &singular));
   /* Forces stay nonnegative. */
   for (PetscInt i = 0; i < d->m && !singular; i++) change[i] = PetscMax(change[i], -d->L[i]);
-  if (!singular) PetscCall(Shift(s, change, x, L));
+  if (!singular) PetscCall(DualShift(s, change, x, L));
   PetscCall(PetscFree2(a, change));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -319,7 +320,7 @@ static PetscErrorCode CloseGaps(HycoSolver s, const Dual *d, Vec x, Vec L)
 /* For a small dense K: computes S again, by solves refined in twice the working precision. Called after a failed
    attempt; *better: S has changed, so that another attempt may succeed. A condensed S of a stiff K has digits lost by
    cancellation, which can make the set cycle. */
-static PetscErrorCode Refine(HycoSolver s, HycoSolverForm form, PetscBool *better)
+static PetscErrorCode DualRefine(HycoSolver s, HycoSolverForm form, PetscBool *better)
 {
   Dual *d = (Dual *)form->data;
   HycoStiffness *f = &s->stiffness;
@@ -346,7 +347,7 @@ static PetscErrorCode Refine(HycoSolver s, HycoSolverForm form, PetscBool *bette
 }
 
 /* A refined factor is that of one solve: later systems start without it. */
-static PetscErrorCode Reset(HycoSolver s, HycoSolverForm form)
+static PetscErrorCode DualReset(HycoSolver s, HycoSolverForm form)
 {
   PetscFunctionBegin;
   (void)form;
@@ -356,7 +357,7 @@ static PetscErrorCode Reset(HycoSolver s, HycoSolverForm form)
 }
 
 /* S and g, forces, displacements, and for dense K a correction. */
-static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
+static PetscErrorCode DualSolve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
 {
   Dual *d = (Dual *)form->data;
   PetscBool singular;
@@ -370,14 +371,14 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   PetscCall(FreeGap(s, d, x));
   HycoLogged(HYCO_EVENT_FORCES, SolveForces(s, d, L, solved));
   PetscCall(SetForces(d, L));
-  PetscCall(Recover(s, d, x, L));
+  PetscCall(DualRecover(s, d, x, L));
   /* Reduced models: gaps that should be 0 have round-off of the dense factor, which one correction removes. */
   if (s->stiffness.lu && !d->p && *solved && s->now.traits & HYCO_TAO_OWN && !s->system->blocks)
     PetscCall(CloseGaps(s, d, x, L));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Destroy(HycoSolverForm form)
+static PetscErrorCode DualDestroy(HycoSolverForm form)
 {
   Dual *d = (Dual *)form->data;
 
@@ -399,13 +400,13 @@ PetscErrorCode HycoSolverFormCreate_Dual(HycoSolver s, HycoSolverForm form)
   PetscCall(HycoTaoCreate(PETSC_COMM_SELF, (PetscObject)s, &d->tao));
   form->data = d;
   form->cones = PETSC_TRUE;
-  *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts,
+  *form->ops = (struct _HycoSolverFormOps){.accepts = DualAccepts,
                                            .estimate = EstimateFactor,
                                            .setup = SetUp,
-                                           .solve = Solve,
-                                           .refine = Refine,
-                                           .reset = Reset,
-                                           .destroy = Destroy};
+                                           .solve = DualSolve,
+                                           .refine = DualRefine,
+                                           .reset = DualReset,
+                                           .destroy = DualDestroy};
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

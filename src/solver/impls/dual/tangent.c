@@ -1,5 +1,5 @@
-/* The derivative of a solution by the system of its closed contacts, with friction of its pieces, with the factor and the
-   flexibility of the dual form: one forward and one back substitution for each change of the data. */
+/* The derivative of a solution by the system of its closed contacts, with friction of its pieces, with the factor and
+   the flexibility of the dual form: one forward and one back substitution for each change of the data. */
 #include <hycosolverimpl.h>
 
 struct _n_HycoSolverTangent {
@@ -32,7 +32,7 @@ PetscInt HycoSolverTangentUndecided(HycoSolverTangent t)
 }
 
 /* The gaps of the contacts in the solution, on every rank. */
-static PetscErrorCode Gaps(HycoSolverTangent t, Vec x, PetscReal gap[])
+static PetscErrorCode DualTangentGaps(HycoSolverTangent t, Vec x, PetscReal gap[])
 {
   HycoSystem y = t->s->system;
   PetscReal sizes[2];
@@ -50,7 +50,7 @@ static PetscErrorCode Gaps(HycoSolverTangent t, Vec x, PetscReal gap[])
 }
 
 /* The states of the contacts in the solution, and the matrix of the closed ones. */
-static PetscErrorCode Close(HycoSolverTangent t, Vec x, Vec L, PetscBool *regular)
+static PetscErrorCode DualTangentClose(HycoSolverTangent t, Vec x, Vec L, PetscBool *regular)
 {
   PetscReal *force, *gap;
   const PetscReal *S;
@@ -58,7 +58,7 @@ static PetscErrorCode Close(HycoSolverTangent t, Vec x, Vec L, PetscBool *regula
   PetscFunctionBegin;
   HycoSolverGetCondensed(t->s, &t->m, &t->p, &S);
   PetscCall(PetscMalloc2(t->m, &force, t->m, &gap));
-  PetscCall(Gaps(t, x, gap));
+  PetscCall(DualTangentGaps(t, x, gap));
   PetscCall(HycoVecGather(L, force));
   PetscCall(HycoTangentCreate(t->p, PETSC_TRUE, t->m, S, force, gap, t->size, &t->tangent, regular));
   PetscCall(PetscFree2(force, gap));
@@ -76,7 +76,7 @@ static PetscErrorCode TakePieces(HycoSolverTangent t, Vec x, Vec before)
   PetscCall(PetscMalloc1(n + 1, &t->dw));
   PetscCall(PetscMalloc1(n + 1, &t->dmu));
   PetscCall(PetscMalloc1(t->m + 1, &t->before));
-  PetscCall(Gaps(t, x, t->w + t->p));
+  PetscCall(DualTangentGaps(t, x, t->w + t->p));
   PetscCall(HycoVecGather(before, t->before));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -106,7 +106,7 @@ static PetscErrorCode SetUp(HycoSolverTangent t, Vec x, Vec L, Vec before, Petsc
   if (s->system->blocks)
     PetscCall(TakePieces(t, x, before));
   else
-    PetscCall(Close(t, x, L, regular));
+    PetscCall(DualTangentClose(t, x, L, regular));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

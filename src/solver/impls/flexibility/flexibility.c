@@ -15,7 +15,8 @@ typedef struct {
 } Flexibility;
 
 /* The only form for a given G. */
-static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
+static PetscErrorCode FlexibilityAccepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost,
+                                         char why[HYCO_LINE])
 {
   PetscFunctionBegin;
   (void)form, (void)asked, (void)why;
@@ -48,7 +49,7 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
 }
 
 /* Starts from the given set, else from that of the last solution. */
-static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
+static PetscErrorCode FlexibilitySolve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
 {
   Flexibility *f = (Flexibility *)form->data;
   HycoSystem y = s->system;
@@ -93,7 +94,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
 }
 
 /* G is the caller's. */
-static PetscErrorCode Destroy(HycoSolverForm form)
+static PetscErrorCode FlexibilityDestroy(HycoSolverForm form)
 {
   Flexibility *f = (Flexibility *)form->data;
 
@@ -116,6 +117,7 @@ PetscErrorCode HycoSolverFormCreate_Flexibility(HycoSolver s, HycoSolverForm for
   PetscCall(HycoTaoCreate(PETSC_COMM_SELF, (PetscObject)s, &f->tao));
   form->data = f;
   form->cones = PETSC_TRUE;
-  *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts, .setup = SetUp, .solve = Solve, .destroy = Destroy};
+  *form->ops = (struct _HycoSolverFormOps){
+      .accepts = FlexibilityAccepts, .setup = SetUp, .solve = FlexibilitySolve, .destroy = FlexibilityDestroy};
   PetscFunctionReturn(PETSC_SUCCESS);
 }

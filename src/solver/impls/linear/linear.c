@@ -9,7 +9,8 @@ typedef struct {
 } Linear;
 
 /* Cost 0: without contact there is nothing else. */
-static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
+static PetscErrorCode LinearAccepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost,
+                                    char why[HYCO_LINE])
 {
   PetscFunctionBegin;
   (void)form, (void)asked, (void)why;
@@ -65,7 +66,7 @@ static PetscErrorCode SolveIterative(HycoSolver s, Linear *l, Vec x, PetscBool *
 }
 
 /* x in place; L is not used. Without contacts: no active set, no loop. */
-static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
+static PetscErrorCode LinearSolve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
 {
   PetscBool singular;
 
@@ -87,7 +88,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Destroy(HycoSolverForm form)
+static PetscErrorCode LinearDestroy(HycoSolverForm form)
 {
   Linear *l = (Linear *)form->data;
 
@@ -105,6 +106,7 @@ PetscErrorCode HycoSolverFormCreate_Linear(HycoSolver s, HycoSolverForm form)
   (void)s;
   PetscCall(PetscNew(&l));
   form->data = l;
-  *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts, .setup = SetUp, .solve = Solve, .destroy = Destroy};
+  *form->ops = (struct _HycoSolverFormOps){
+      .accepts = LinearAccepts, .setup = SetUp, .solve = LinearSolve, .destroy = LinearDestroy};
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -112,7 +112,7 @@ static PetscErrorCode FindSigns(const Rows *r, const PetscReal bound[], PetscRea
 
 /* The weakest strong coupling of a row, as a negative number; 0: the row has no couplings. Couplings are negative
    here. */
-static PetscReal Strong(const Rows *r, PetscInt i)
+static PetscReal NestedIterationStrong(const Rows *r, PetscInt i)
 {
   PetscReal least = 0;
 
@@ -124,7 +124,7 @@ static PetscReal Strong(const Rows *r, PetscInt i)
 
 /* coarse_of: a maximal independent set, numbered in the order of the unknowns; returns its size. Breadth first in
    the matrix graph: about every second unknown of a chain is kept. */
-static PetscErrorCode Split(const Rows *r, PetscInt coarse_of[], PetscInt *n_coarse)
+static PetscErrorCode NestedIterationSplit(const Rows *r, PetscInt coarse_of[], PetscInt *n_coarse)
 {
   PetscInt *queue, head = 0, tail = 0;
   PetscBool *seen;
@@ -139,7 +139,7 @@ static PetscErrorCode Split(const Rows *r, PetscInt coarse_of[], PetscInt *n_coa
     queue[tail++] = s;
     while (head < tail) {
       const PetscInt i = queue[head++];
-      const PetscReal strong = Strong(r, i);
+      const PetscReal strong = NestedIterationStrong(r, i);
       PetscBool stays = (PetscBool)(strong < 0);
 
       for (PetscInt k = r->start[i]; strong < 0 && k < r->start[i + 1]; k++) {
@@ -166,7 +166,7 @@ static PetscErrorCode Split(const Rows *r, PetscInt coarse_of[], PetscInt *n_coa
 
 /* P: identity on the unknowns kept; elsewhere w_ij = -(sum_k K_ik / sum of its strong coarse K_ij) K_ij / K_ii.
    Classical direct interpolation: constants are reproduced where rows sum to zero. */
-static PetscErrorCode Interpolate(const Rows *r, const PetscInt coarse_of[], PetscInt n_coarse, Mat *P)
+static PetscErrorCode NestedIterationInterpolate(const Rows *r, const PetscInt coarse_of[], PetscInt n_coarse, Mat *P)
 {
   PetscInt *length, *col, longest = 1;
   PetscScalar *weight;
@@ -174,7 +174,7 @@ static PetscErrorCode Interpolate(const Rows *r, const PetscInt coarse_of[], Pet
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(r->n, &length));
   for (PetscInt i = 0; i < r->n; i++) {
-    const PetscReal strong = Strong(r, i);
+    const PetscReal strong = NestedIterationStrong(r, i);
 
     length[i] = coarse_of[i] >= 0;
     for (PetscInt k = r->start[i]; coarse_of[i] < 0 && strong < 0 && k < r->start[i + 1]; k++)
@@ -184,7 +184,7 @@ static PetscErrorCode Interpolate(const Rows *r, const PetscInt coarse_of[], Pet
   PetscCall(MatCreateSeqAIJ(PETSC_COMM_SELF, r->n, n_coarse, 0, length, P));
   PetscCall(PetscMalloc2(longest, &col, longest, &weight));
   for (PetscInt i = 0; i < r->n; i++) {
-    const PetscReal strong = Strong(r, i);
+    const PetscReal strong = NestedIterationStrong(r, i);
     PetscReal diagonal = 0, all = 0, taken = 0;
     PetscInt n = 0;
 
@@ -217,7 +217,7 @@ static PetscErrorCode Interpolate(const Rows *r, const PetscInt coarse_of[], Pet
 
 /* The next coarser level; *made is false if the matrix is small, or cannot be coarsened. Bounds and loads of coarse
    unknowns are those of the finer level. Galerkin's coarse matrix P^T K P keeps symmetry and definiteness. */
-static PetscErrorCode Coarsen(Level *fine, Level *coarse, PetscBool *made)
+static PetscErrorCode NestedIterationCoarsen(Level *fine, Level *coarse, PetscBool *made)
 {
   Rows r;
 
@@ -226,10 +226,10 @@ static PetscErrorCode Coarsen(Level *fine, Level *coarse, PetscBool *made)
   if (fine->n <= HYCO_COARSEST) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(RowsGet(fine->K, &r));
   PetscCall(PetscMalloc1(fine->n, &fine->coarse_of));
-  PetscCall(Split(&r, fine->coarse_of, &coarse->n));
+  PetscCall(NestedIterationSplit(&r, fine->coarse_of, &coarse->n));
   /* A level that hardly shrinks would cost as much as the finer one. */
   *made = (PetscBool)(coarse->n > 0 && coarse->n <= 0.8 * fine->n);
-  if (*made) PetscCall(Interpolate(&r, fine->coarse_of, coarse->n, &fine->P));
+  if (*made) PetscCall(NestedIterationInterpolate(&r, fine->coarse_of, coarse->n, &fine->P));
   PetscCall(RowsRestore(&r));
   if (!*made) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatPtAP(fine->K, fine->P, MAT_INITIAL_MATRIX, 2, &coarse->K));
@@ -277,7 +277,7 @@ static PetscErrorCode SolveOnLevel(void *ctx, PetscBool active[], PetscBool *sin
 
 /* Which unknowns change sides: negative forces at closed ones, values beyond the bound at open ones, both beyond
    round-off. */
-static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool violates[])
+static PetscErrorCode NestedIterationViolations(void *ctx, const PetscBool active[], PetscBool violates[])
 {
   const Solve *p = (const Solve *)ctx;
   const Level *l = p->level;
@@ -317,7 +317,7 @@ static PetscErrorCode SolveLevel(Level *l, Vec y)
                              .max_its = HYCO_LEVEL_ITS,
                              .ctx = &p,
                              .solve = SolveOnLevel,
-                             .violations = Violations};
+                             .violations = NestedIterationViolations};
   PetscInt its;
   HycoLCPStatus status;
 
@@ -336,7 +336,7 @@ static PetscErrorCode SolveLevel(Level *l, Vec y)
 
 /* The finer set: coarse unknowns keep their state; interpolated ones are relaxed once, and closed if this exceeds
    the bound. One Jacobi step with the coarse values. */
-static PetscErrorCode Prolong(Level *fine, const Level *coarse, Vec y)
+static PetscErrorCode NestedIterationProlong(Level *fine, const Level *coarse, Vec y)
 {
   Vec fine_y, diagonal;
   const PetscScalar *value, *f, *d;
@@ -361,7 +361,7 @@ static PetscErrorCode Prolong(Level *fine, const Level *coarse, Vec y)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Also of a level that Coarsen() has begun and given up. NULL-safe in each part. */
+/* Also of a level that NestedIterationCoarsen() has begun and given up. NULL-safe in each part. */
 static PetscErrorCode LevelDestroy(Level *l)
 {
   PetscFunctionBegin;
@@ -372,7 +372,7 @@ static PetscErrorCode LevelDestroy(Level *l)
 
 /* From level 0 to the coarsest level and back; level 0 is not solved. A level is freed as soon as the finer set is
    known. */
-static PetscErrorCode Cascade(Level level[], PetscBool *made)
+static PetscErrorCode NestedIterationCascade(Level level[], PetscBool *made)
 {
   PetscInt n = 1;
   PetscBool more = PETSC_TRUE;
@@ -380,7 +380,7 @@ static PetscErrorCode Cascade(Level level[], PetscBool *made)
   PetscFunctionBegin;
   /* Until a level is small or does not shrink. */
   while (more && n < HYCO_MAX_LEVELS) {
-    PetscCall(Coarsen(&level[n - 1], &level[n], &more));
+    PetscCall(NestedIterationCoarsen(&level[n - 1], &level[n], &more));
     n += more;
   }
   *made = (PetscBool)(n > 1);
@@ -389,7 +389,7 @@ static PetscErrorCode Cascade(Level level[], PetscBool *made)
 
     PetscCall(VecDuplicate(level[l].f, &y));
     PetscCall(SolveLevel(&level[l], y));
-    PetscCall(Prolong(&level[l - 1], &level[l], y));
+    PetscCall(NestedIterationProlong(&level[l - 1], &level[l], y));
     PetscCall(VecDestroy(&y));
     PetscCall(LevelDestroy(&level[l]));
   }
@@ -424,7 +424,7 @@ static PetscErrorCode StartOnRoot(Mat K, Vec f, Vec bound, Vec set, PetscBool *m
     PetscCall(MatDiagonalScale(level->K, signs, signs));
     PetscCall(VecDuplicate(f, &level->f));
     PetscCall(VecPointwiseMult(level->f, f, signs));
-    PetscCall(Cascade(level, made));
+    PetscCall(NestedIterationCascade(level, made));
   }
   PetscCall(VecGetArray(set, &out));
   for (PetscInt i = 0; *made && i < level->n; i++) out[i] = level->active[i] ? 1 : 0;

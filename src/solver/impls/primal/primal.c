@@ -41,7 +41,7 @@ typedef struct {
 } Primal;
 
 /* Evaluates the values at the pivots, and the forces. Forces are the residuals f - Kg y. */
-static PetscErrorCode Evaluate(const Primal *p)
+static PetscErrorCode PrimalEvaluate(const Primal *p)
 {
   PetscFunctionBegin;
   PetscCall(MatMult(p->gap->Kg, p->y, p->residual));
@@ -52,7 +52,7 @@ static PetscErrorCode Evaluate(const Primal *p)
 }
 
 /* The bounds of the contacts' unknowns are those of the Tao. */
-static PetscErrorCode Bounds(void *ctx, Vec lo, Vec hi)
+static PetscErrorCode PrimalBounds(void *ctx, Vec lo, Vec hi)
 {
   const Primal *p = (const Primal *)ctx;
 
@@ -80,12 +80,12 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
   /* Counts of the report. */
   if (p->s->iterative) HycoCountLinear(p->s, its);
   if (p->s->iterative) PetscCall(HycoSolverNoteKSP(p->s, g->ksp));
-  if (!*singular) PetscCall(Evaluate(p));
+  if (!*singular) PetscCall(PrimalEvaluate(p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Sizes over all ranks, so that a rank without contacts with forces judges alike; noise: of iterative solves. */
-static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool violates[])
+static PetscErrorCode PrimalViolations(void *ctx, const PetscBool active[], PetscBool violates[])
 {
   const Primal *p = (const Primal *)ctx;
   PetscReal size[2] = {0, 0}, sizes[2];
@@ -137,7 +137,7 @@ static PetscErrorCode SetAccuracy(Primal *p, PetscReal noise)
 
 /* Writes x and the forces of the set, without negative ones if `clean`. x = T y; rows of idle contacts have no
    force. */
-static PetscErrorCode Fill(const Primal *p, PetscBool clean)
+static PetscErrorCode PrimalFill(const Primal *p, PetscBool clean)
 {
   const Gap *g = p->gap;
   PetscScalar *l;
@@ -159,7 +159,7 @@ static PetscErrorCode Fill(const Primal *p, PetscBool clean)
 
 /* The set has converged with inaccurate solves: continues with accurate ones, up to the target of the residual.
    First the accuracy of the set, then, with a target, that of the residual. */
-static PetscErrorCode Settled(void *ctx, PetscBool *more)
+static PetscErrorCode PrimalIsSettled(void *ctx, PetscBool *more)
 {
   Primal *p = (Primal *)ctx;
   HycoSolver s = p->s;
@@ -170,7 +170,7 @@ static PetscErrorCode Settled(void *ctx, PetscBool *more)
   *more = (PetscBool)(p->noise > HYCO_NOISE);
   if (*more) PetscCall(SetAccuracy(p, HYCO_NOISE));
   if (*more || !s->iterative || !(s->target > 0)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Fill(p, PETSC_TRUE));
+  PetscCall(PrimalFill(p, PETSC_TRUE));
   PetscCall(HycoSystemComputeKKT(s->system, p->x, p->L, &kkt));
   *more = (PetscBool)(s->system->residual > s->target && p->noise > HYCO_NOISE_LEAST);
   if (*more) PetscCall(SetAccuracy(p, p->noise * PetscMin(0.03, 0.3 * s->target / s->system->residual)));
@@ -178,7 +178,7 @@ static PetscErrorCode Settled(void *ctx, PetscBool *more)
 }
 
 /* Replaces a set from the last solution that was far from the new one. Once, after HYCO_WARM_ITS iterations. */
-static PetscErrorCode Restart(void *ctx, PetscInt its, PetscBool active[], PetscBool *fresh)
+static PetscErrorCode PrimalRestart(void *ctx, PetscInt its, PetscBool active[], PetscBool *fresh)
 {
   const Primal *p = (const Primal *)ctx;
 
@@ -212,11 +212,11 @@ static PetscErrorCode ActiveSet(Primal *p, Gap *g, PetscBool *solved)
                        .max_its = s->max_its ? s->max_its : 100 + s->system->m,
                        .one_by_one = PETSC_TRUE,
                        .ctx = p,
-                       .bounds = Bounds,
+                       .bounds = PrimalBounds,
                        .solve = SolveOnSet,
-                       .violations = Violations,
-                       .restart = Restart,
-                       .settled = Settled,
+                       .violations = PrimalViolations,
+                       .restart = PrimalRestart,
+                       .settled = PrimalIsSettled,
                        .monitor = s->monitor,
                        .monitor_ctx = s->monitor_ctx};
   HycoLCPStatus status;
@@ -255,7 +255,7 @@ static PetscErrorCode BoundQP(Primal *p, Gap *g, PetscBool *solved)
   PetscCall(MatSetOption(g->H, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(HycoTaoSetType(g->tao, s->now.type, s->max_its));
   PetscCall(HycoTaoSolve(g->tao, g->H, p->rhs, lo, p->hi, p->y, &s->its, solved));
-  PetscCall(Evaluate(p));
+  PetscCall(PrimalEvaluate(p));
   for (PetscInt k = 0; k < p->n; k++) { /* scaling and its inverse may have moved a value from its bound */
     const PetscReal ulps = 8 * PETSC_MACHINE_EPSILON * PetscAbsReal(p->bound[k]);
 
@@ -304,7 +304,8 @@ static PetscErrorCode PrimalCreate(HycoSolver s, const Gap *g, Vec x, Primal *p)
 
 /* Chosen automatically if there are many contacts, or if K is solved iteratively. Cost 1 is below that of the dual
    form. */
-static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
+static PetscErrorCode PrimalAccepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost,
+                                    char why[HYCO_LINE])
 {
   Gap *g = (Gap *)form->data;
   HycoSystem y = s->system;
@@ -347,7 +348,7 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
 }
 
 /* Active set method or a Tao type, then x and L from y. */
-static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
+static PetscErrorCode PrimalSolve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
 {
   Gap *g = (Gap *)form->data;
   const PetscBool own = (PetscBool)(s->now.traits & HYCO_TAO_OWN);
@@ -361,14 +362,14 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   PetscCall(own ? ActiveSet(&p, g, solved) : BoundQP(&p, g, solved));
   PetscCall(HycoNameLinear(s, g->ksp));
   /* if not solved, the set has changed since: its last forces show in the residuals */
-  PetscCall(Fill(&p, (PetscBool)(*solved || !own)));
+  PetscCall(PrimalFill(&p, (PetscBool)(*solved || !own)));
   /* The form's matrices and its solver stay for the next solve. */
   PetscCall(PetscFree6(p.bound, p.value, p.force, p.diagonal, p.at_d, p.at));
   HycoDestroyAll(&p.y, &p.hi, &p.f, &p.rhs, &p.residual, &p.work, &p.scatter);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Destroy(HycoSolverForm form)
+static PetscErrorCode PrimalDestroy(HycoSolverForm form)
 {
   Gap *g = (Gap *)form->data;
 
@@ -399,7 +400,10 @@ PetscErrorCode HycoSolverFormCreate_Primal(HycoSolver s, HycoSolverForm form)
   PetscCall(PetscNew(&g));
   PetscCall(HycoTaoCreate(HycoComm(s), (PetscObject)s, &g->tao));
   form->data = g;
-  *form->ops = (struct _HycoSolverFormOps){
-      .accepts = Accepts, .setup = SetUp, .solve = Solve, .setfromoptions = SetFromOptions, .destroy = Destroy};
+  *form->ops = (struct _HycoSolverFormOps){.accepts = PrimalAccepts,
+                                           .setup = SetUp,
+                                           .solve = PrimalSolve,
+                                           .setfromoptions = SetFromOptions,
+                                           .destroy = PrimalDestroy};
   PetscFunctionReturn(PETSC_SUCCESS);
 }

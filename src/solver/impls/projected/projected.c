@@ -79,7 +79,7 @@ static PetscErrorCode FindNodes(HycoSystem y, Projected *f)
 }
 
 /* The bounds of B x are those of the Tao. */
-static PetscErrorCode Bounds(void *ctx, Vec lo, Vec hi)
+static PetscErrorCode ProjectedBounds(void *ctx, Vec lo, Vec hi)
 {
   const Run *p = (const Run *)ctx;
   const PetscScalar *d;
@@ -137,7 +137,7 @@ static PetscErrorCode SetConstraints(Run *p, const PetscBool active[], PetscBool
 
 /* Evaluates the contacts' B x, and the forces of the active ones. Forces of the active rows by least squares from
    the residual K x - F. */
-static PetscErrorCode Evaluate(Run *p, const PetscBool active[])
+static PetscErrorCode ProjectedEvaluate(Run *p, const PetscBool active[])
 {
   const Projected *f = p->form;
   HycoSystem y = p->s->system;
@@ -180,12 +180,12 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
   if (p->size < 0) PetscCall(HycoConstrainedSize(p->form->constrained, p->s->system->F, &p->size));
   PetscCall(HycoConstrainedSolve(p->form->constrained, p->s->system->F, p->d, p->accuracy, &p->size, p->x, &its));
   HycoCountLinear(p->s, its);
-  PetscCall(Evaluate(p, active));
+  PetscCall(ProjectedEvaluate(p, active));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Violations below the accuracy of the solve do not change the set. */
-static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool violates[])
+static PetscErrorCode ProjectedViolations(void *ctx, const PetscBool active[], PetscBool violates[])
 {
   const Run *p = (const Run *)ctx;
   const Projected *f = p->form;
@@ -223,7 +223,7 @@ static PetscErrorCode FillForces(const Run *p, PetscBool clean, const PetscBool 
 
 /* Reduces the accuracy by a factor. A given start may already be more accurate than the present one. By what the
    last solve has reached, if that is less. */
-static PetscErrorCode Sharpen(Run *p, PetscReal factor)
+static PetscErrorCode ProjectedSharpen(Run *p, PetscReal factor)
 {
   KSP ksp;
   PetscReal left;
@@ -238,7 +238,7 @@ static PetscErrorCode Sharpen(Run *p, PetscReal factor)
 
 /* The set has converged: solves more accurately, to the final accuracy and further if the residual requires it. With a
    target of the residual, the set of the previous solve goes there directly. */
-static PetscErrorCode Settled(void *ctx, PetscBool *more)
+static PetscErrorCode ProjectedIsSettled(void *ctx, PetscBool *more)
 {
   Run *p = (Run *)ctx;
   HycoSolver s = p->s;
@@ -257,7 +257,7 @@ static PetscErrorCode Settled(void *ctx, PetscBool *more)
   missing = kkt.stationarity / (0.3 * s->rtol);
   if (s->target > 0) missing = PetscMax(missing, s->system->residual / s->target);
   *more = (PetscBool)(missing > 1 && p->accuracy > HYCO_LEAST);
-  if (*more) PetscCall(Sharpen(p, PetscMin(0.03, 0.3 / missing)));
+  if (*more) PetscCall(ProjectedSharpen(p, PetscMin(0.03, 0.3 / missing)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -276,7 +276,8 @@ static PetscErrorCode RunCreate(HycoSolver s, Projected *f, Vec x, Run *p)
 
 /* For solves without a factor, by the active set method; an obstacle along a whole body is left to the primal form,
    which starts from coarser problems. */
-static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
+static PetscErrorCode ProjectedAccepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost,
+                                       char why[HYCO_LINE])
 {
   Projected *f = (Projected *)form->data;
   HycoSystem y = s->system;
@@ -336,18 +337,18 @@ static PetscErrorCode NameSolves(HycoSolver s, const Projected *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Cold or warm active set; accuracy grows by Settled(). */
-static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
+/* Cold or warm active set; accuracy grows by ProjectedIsSettled(). */
+static PetscErrorCode ProjectedSolve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
 {
   Projected *f = (Projected *)form->data;
   HycoActiveSet set = {.comm = HycoComm(s),
                        .n = f->n,
                        .max_its = s->max_its ? s->max_its : 100 + s->system->m,
                        .one_by_one = PETSC_TRUE,
-                       .bounds = Bounds,
+                       .bounds = ProjectedBounds,
                        .solve = SolveOnSet,
-                       .violations = Violations,
-                       .settled = Settled,
+                       .violations = ProjectedViolations,
+                       .settled = ProjectedIsSettled,
                        .monitor = s->monitor,
                        .monitor_ctx = s->monitor_ctx};
   HycoLCPStatus status;
@@ -375,7 +376,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Destroy(HycoSolverForm form)
+static PetscErrorCode ProjectedDestroy(HycoSolverForm form)
 {
   Projected *f = (Projected *)form->data;
 
@@ -395,6 +396,7 @@ PetscErrorCode HycoSolverFormCreate_Projected(HycoSolver s, HycoSolverForm form)
   PetscCall(PetscNew(&f));
   PetscCall(HycoTaoCreate(HycoComm(s), (PetscObject)s, &f->tao));
   form->data = f;
-  *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts, .setup = SetUp, .solve = Solve, .destroy = Destroy};
+  *form->ops = (struct _HycoSolverFormOps){
+      .accepts = ProjectedAccepts, .setup = SetUp, .solve = ProjectedSolve, .destroy = ProjectedDestroy};
   PetscFunctionReturn(PETSC_SUCCESS);
 }

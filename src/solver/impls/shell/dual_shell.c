@@ -12,7 +12,8 @@ typedef struct {
 } Shell;
 
 /* Only on request, for Tao types that need products alone. */
-static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
+static PetscErrorCode DualShellAccepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost,
+                                       char why[HYCO_LINE])
 {
   const int traits = s->now.traits;
   PetscInt p = 0;
@@ -137,7 +138,7 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
 
 /* L from min 1/2 L^T S L + g^T L, L >= 0, with g = D - B K^-1 F. Bound-constrained quadratic problem; S is symmetric
    here. */
-static PetscErrorCode Forces(const Shell *p, Mat S, Vec x, Vec L, PetscBool *solved)
+static PetscErrorCode DualShellForces(const Shell *p, Mat S, Vec x, Vec L, PetscBool *solved)
 {
   HycoSolver s = p->s;
   HycoSystem y = s->system;
@@ -160,7 +161,7 @@ static PetscErrorCode Forces(const Shell *p, Mat S, Vec x, Vec L, PetscBool *sol
 }
 
 /* x = K^-1 (F - Bt L), refined once. The second pass refines by the residual of the first one. */
-static PetscErrorCode Displacements(HycoSolver s, Shell *f, Vec x, Vec L)
+static PetscErrorCode DualShellDisplacements(HycoSolver s, Shell *f, Vec x, Vec L)
 {
   HycoSystem y = s->system;
 
@@ -180,7 +181,7 @@ static PetscErrorCode Displacements(HycoSolver s, Shell *f, Vec x, Vec L)
 }
 
 /* The factor is kept; vectors and the shell are of this solve. */
-static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
+static PetscErrorCode DualShellSolve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
 {
   Shell *f = (Shell *)form->data;
   HycoSystem y = s->system;
@@ -205,13 +206,13 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   HycoVecDuplicate(y->F, &f->force, &f->motion);
   PetscCall(VecDuplicate(y->D, &f->diagonal));
   PetscCall(EstimateDiagonal(S, f));
-  PetscCall(Forces(f, S, x, L, solved));
-  PetscCall(Displacements(s, f, x, L));
+  PetscCall(DualShellForces(f, S, x, L, solved));
+  PetscCall(DualShellDisplacements(s, f, x, L));
   HycoDestroyAll(&f->force, &f->motion, &f->diagonal, &S);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Destroy(HycoSolverForm form)
+static PetscErrorCode DualShellDestroy(HycoSolverForm form)
 {
   PetscFunctionBegin;
   PetscCall(HycoTaoDestroy(&((Shell *)form->data)->tao));
@@ -229,6 +230,7 @@ PetscErrorCode HycoSolverFormCreate_Shell(HycoSolver s, HycoSolverForm form)
   f->s = s;
   PetscCall(HycoTaoCreate(HycoComm(s), (PetscObject)s, &f->tao));
   form->data = f;
-  *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts, .setup = SetUp, .solve = Solve, .destroy = Destroy};
+  *form->ops = (struct _HycoSolverFormOps){
+      .accepts = DualShellAccepts, .setup = SetUp, .solve = DualShellSolve, .destroy = DualShellDestroy};
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,7 +1,7 @@
 /*
-  Rows of B that do not change in the bodies' axes from one prediction to the next, as where a stated normal turns with a
-  body or the bodies do not move past each other: C_b B_b^T and B_b C_b B_b^T do not either, in any term of C_b. A column of
-  each is computed when its contact is in a problem for the first time, and kept.
+  Rows of B that do not change in the bodies' axes from one prediction to the next, as where a stated normal turns with
+  a body or the bodies do not move past each other: C_b B_b^T and B_b C_b B_b^T do not either, in any term of C_b. A
+  column of each is computed when its contact is in a problem for the first time, and kept.
 */
 #include <hycobodies.h>
 
@@ -9,9 +9,9 @@
 #define MOST_BYTES 1e9
 
 /* Whether the rows are the last ones. */
-static PetscBool Same(HycoBodiesWork o, PetscInt m)
+static PetscBool RowCacheIsSame(HycoBodiesWork o, PetscInt m)
 {
-  const HycoBodiesKept *kept = &o->kept;
+  const HycoBodiesRowCache *kept = &o->kept;
 
   if (!kept->start) return PETSC_FALSE;
   /* Cheapest first: a contact that has another number of masters differs here. */
@@ -26,7 +26,7 @@ static PetscBool Same(HycoBodiesWork o, PetscInt m)
 }
 
 /* The arrays P and W stay, with NULL entries: the next rows have as many. */
-static PetscErrorCode ForgetColumns(HycoBodiesKept *kept, PetscInt n)
+static PetscErrorCode ForgetColumns(HycoBodiesRowCache *kept, PetscInt n)
 {
   PetscFunctionBegin;
   for (PetscInt i = 0; kept->P && i < n; i++) HycoFreeAll(&kept->P[i], &kept->W[i], &kept->blend[i]);
@@ -35,9 +35,9 @@ static PetscErrorCode ForgetColumns(HycoBodiesKept *kept, PetscInt n)
 }
 
 /* After Reset() `bodies` is NULL, and there is nothing to count. */
-PetscErrorCode HycoBodiesForgetKept(HycoBodiesWork o)
+PetscErrorCode HycoBodiesResetRowCache(HycoBodiesWork o)
 {
-  HycoBodiesKept *kept = &o->kept;
+  HycoBodiesRowCache *kept = &o->kept;
 
   PetscFunctionBegin;
   if (o->bodies) PetscCall(ForgetColumns(kept, kept->m * o->bodies->n));
@@ -49,11 +49,11 @@ PetscErrorCode HycoBodiesForgetKept(HycoBodiesWork o)
    products depend on the rows B and on nothing else that a parameter of loads or gaps changes. */
 PetscErrorCode HycoBodiesKeepRows(HycoBodiesWork o, PetscInt m)
 {
-  HycoBodiesKept *kept = &o->kept;
+  HycoBodiesRowCache *kept = &o->kept;
   const PetscInt n = m * o->bodies->n;
 
   PetscFunctionBegin;
-  kept->same = Same(o, m);
+  kept->same = RowCacheIsSame(o, m);
   if (kept->same && !kept->P) {
     PetscCall(PetscCalloc1(n + 1, &kept->P));
     PetscCall(PetscCalloc1(n + 1, &kept->W));
@@ -73,7 +73,7 @@ PetscErrorCode HycoBodiesKeepRows(HycoBodiesWork o, PetscInt m)
 }
 
 /* W[j] = the products of P, the displacements of body b, with the rows. */
-static void Multiply(HycoBodiesWork o, PetscInt b, const PetscReal P[], PetscReal W[])
+static void RowCacheMultiply(HycoBodiesWork o, PetscInt b, const PetscReal P[], PetscReal W[])
 {
   const PetscInt lo = o->bodies->start[b], hi = o->bodies->start[b + 1];
 
@@ -88,7 +88,7 @@ static void Multiply(HycoBodiesWork o, PetscInt b, const PetscReal P[], PetscRea
 /* Of contact k in body b, if its row has entries there. */
 static PetscErrorCode KeepInBody(HycoBodiesWork o, PetscInt k, PetscInt b)
 {
-  HycoBodiesKept *kept = &o->kept;
+  HycoBodiesRowCache *kept = &o->kept;
   const HycoSubstructure *own = &o->bodies->body[b];
   const PetscInt lo = o->bodies->start[b], at = k * o->bodies->n + b;
   const size_t n = (size_t)own->n;
@@ -109,14 +109,14 @@ static PetscErrorCode KeepInBody(HycoBodiesWork o, PetscInt k, PetscInt b)
       HycoFlexibilityAdd(&own->C, t, place, o->row[e], kept->P[at] + (size_t)t * n);
   }
   for (PetscInt t = 0; t < own->C.n_terms && kept->P[at]; t++)
-    Multiply(o, b, kept->P[at] + (size_t)t * n, kept->W[at] + (size_t)t * (size_t)kept->m);
+    RowCacheMultiply(o, b, kept->P[at] + (size_t)t * n, kept->W[at] + (size_t)t * (size_t)kept->m);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Contacts are made one by one as they close: those that never do cost neither time nor memory. */
 PetscErrorCode HycoBodiesKeep(HycoBodiesWork o, PetscInt n, const PetscInt contact[])
 {
-  HycoBodiesKept *kept = &o->kept;
+  HycoBodiesRowCache *kept = &o->kept;
   const PetscInt bodies = o->bodies->n;
 
   PetscFunctionBegin;
@@ -135,7 +135,7 @@ PetscErrorCode HycoBodiesKeep(HycoBodiesWork o, PetscInt n, const PetscInt conta
 
 /* 1 / kappa and the weights are applied here, so that the kept columns serve any stiffness and shape at these
    rows. */
-void HycoBodiesKeptRow(HycoBodiesWork o, PetscInt k, PetscInt n, const PetscInt contact[], PetscReal row[])
+void HycoBodiesRowCacheGet(HycoBodiesWork o, PetscInt k, PetscInt n, const PetscInt contact[], PetscReal row[])
 {
   const HycoSubstructures b = o->bodies;
 
@@ -156,7 +156,7 @@ void HycoBodiesKeptRow(HycoBodiesWork o, PetscInt k, PetscInt n, const PetscInt 
 /* P of contact k in body j at the present weights; made once for these. */
 static PetscErrorCode BlendColumn(HycoBodiesWork o, PetscInt k, PetscInt j, const PetscReal **column)
 {
-  HycoBodiesKept *kept = &o->kept;
+  HycoBodiesRowCache *kept = &o->kept;
   const HycoSubstructure *own = &o->bodies->body[j];
   const PetscInt at = k * o->bodies->n + j;
 
@@ -178,7 +178,7 @@ static PetscErrorCode BlendColumn(HycoBodiesWork o, PetscInt k, PetscInt j, cons
 }
 
 /* u -= C B^T Lambda, blended between the samples; kappa is the body's stiffness relative to that of its samples. */
-PetscErrorCode HycoBodiesKeptDisplace(HycoBodiesWork o, PetscInt m, const PetscReal Lambda[], PetscReal u[])
+PetscErrorCode HycoBodiesRowCacheDisplace(HycoBodiesWork o, PetscInt m, const PetscReal Lambda[], PetscReal u[])
 {
   const HycoSubstructures b = o->bodies;
 

@@ -1,7 +1,7 @@
 /*
-  Derivatives of a path of elastic bodies with friction by its parameters, step by step. With s = B_t U, the slips since the
-  begin, a step has w = (w_n, s_old - s), so that its problem moves by the change of the data and by s_old' of the step before.
-  With r' and w' on its contacts' states (cone_tangent.c)
+  Derivatives of a path of elastic bodies with friction by its parameters, step by step. With s = B_t U, the slips since
+  the begin, a step has w = (w_n, s_old - s), so that its problem moves by the change of the data and by s_old' of the
+  step before. With r' and w' on its contacts' states (cone_tangent.c)
 
       s' = s_old' - w_t',      (work)' = -(r_t' . w_t + r_t . w_t')
 */
@@ -11,7 +11,7 @@
 
 #define RETURNED 1e-8 /* share of the forces by which those of the path are found again */
 
-struct _n_HycoBodiesAlong {
+struct _n_HycoBodiesSensitivity {
   HycoRows rows;            /* beside the path, with tangents, */
   PetscReal *tangent, *mu;  /* 6 n_contacts; 5 x n_contacts: coefficients, by point */
   PetscReal *none;          /* no displacement, and no forces */
@@ -26,9 +26,9 @@ struct _n_HycoBodiesAlong {
 };
 
 /* NULL-safe, also where no derivatives have been asked for. */
-PetscErrorCode HycoBodiesAlongDestroy(HycoBodiesFriction f)
+PetscErrorCode HycoBodiesSensitivityDestroy(HycoBodiesFriction f)
 {
-  HycoBodiesAlong a = f ? f->along : NULL;
+  HycoBodiesSensitivity a = f ? f->along : NULL;
 
   PetscFunctionBegin;
   if (!a) PetscFunctionReturn(PETSC_SUCCESS);
@@ -38,10 +38,10 @@ PetscErrorCode HycoBodiesAlongDestroy(HycoBodiesFriction f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Make(HycoBodiesFriction f)
+static PetscErrorCode BodiesTangentMake(HycoBodiesFriction f)
 {
   const PetscInt n = f->all.n, N = f->p + n, parameters = f->normal.fe->scene->n_parameters;
-  HycoBodiesAlong a;
+  HycoBodiesSensitivity a;
 
   PetscFunctionBegin;
   if (f->along) PetscFunctionReturn(PETSC_SUCCESS);
@@ -65,7 +65,7 @@ static PetscErrorCode Make(HycoBodiesFriction f)
 /* The slips before the step along its tangents, and the gaps without them. */
 static void TakeOld(HycoBodiesFriction f)
 {
-  HycoBodiesAlong a = f->along;
+  HycoBodiesSensitivity a = f->along;
 
   for (PetscInt k = 0; k < f->slip.n; k++) {
     PetscReal jump[3];
@@ -82,10 +82,10 @@ static void TakeOld(HycoBodiesFriction f)
   }
 }
 
-/* The forces of the path solve the step at once, and give the factor of its states. Without forces a solve would not know
-   where the bodies were before, but the path has their motions. */
-static PetscErrorCode Find(HycoBodiesFriction f, HycoBodiesWork o, const PetscReal taken[], const PetscReal alpha[],
-                           PetscBool *able)
+/* The forces of the path solve the step at once, and give the factor of its states. Without forces a solve would not
+   know where the bodies were before, but the path has their motions. */
+static PetscErrorCode BodiesTangentFind(HycoBodiesFriction f, HycoBodiesWork o, const PetscReal taken[],
+                                        const PetscReal alpha[], PetscBool *able)
 {
   const PetscInt N = f->p + f->all.n;
   PetscReal most = 0;
@@ -99,13 +99,13 @@ static PetscErrorCode Find(HycoBodiesFriction f, HycoBodiesWork o, const PetscRe
     PetscCall(PetscArraycpy(o->x, taken, f->p));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(HycoBodiesFrictionTouch(f, o, 0, alpha, PETSC_TRUE, &its, able));
+  PetscCall(HycoBodiesFrictionSolveContact(f, o, 0, alpha, PETSC_TRUE, &its, able));
   for (PetscInt i = f->p; i < N; i++) *able = (PetscBool)(*able && PetscAbsReal(f->z[i] - taken[i]) <= RETURNED * most);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoBodiesAlongStand(HycoROM m, HycoBodiesFriction f, HycoBodiesWork o, PetscInt k,
-                                    const PetscReal alpha[], PetscBool *able)
+PetscErrorCode HycoBodiesSensitivityLinearise(HycoROM m, HycoBodiesFriction f, HycoBodiesWork o, PetscInt k,
+                                              const PetscReal alpha[], PetscBool *able)
 {
   const PetscInt n = f->all.n, N = f->p + n, parameters = m->model->scene->n_parameters;
   const PetscReal *taken = f->taken + (size_t)k * (size_t)N;
@@ -115,7 +115,7 @@ PetscErrorCode HycoBodiesAlongStand(HycoROM m, HycoBodiesFriction f, HycoBodiesW
   /* Others have followed a path since. */
   *able = (PetscBool)(f->n_taken == m->trace.n);
   if (!*able || k < 0) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Make(f));
+  PetscCall(BodiesTangentMake(f));
   if (k) {
     PetscCall(PetscArraycpy(f->U_old, f->U, f->normal.fe->n_dof));
   } else {
@@ -124,7 +124,7 @@ PetscErrorCode HycoBodiesAlongStand(HycoROM m, HycoBodiesFriction f, HycoBodiesW
     PetscCall(PetscArrayzero(f->along->work, parameters * f->slip.n));
   }
   PetscCall(HycoBodiesFrictionPrepare(f, o, m->fe->mu));
-  PetscCall(Find(f, o, taken, alpha, able));
+  PetscCall(BodiesTangentFind(f, o, taken, alpha, able));
   PetscCall(HycoBodiesFrictionMove(f, o, &kkt));
   f->along->before = k ? taken - f->all.n : f->along->none;
   PetscCall(PetscArraycpy(f->along->slack + f->p, f->w, n));
@@ -132,9 +132,9 @@ PetscErrorCode HycoBodiesAlongStand(HycoROM m, HycoBodiesFriction f, HycoBodiesW
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void HycoBodiesAlongRest(HycoBodiesFriction f, const PetscInt **row, PetscReal w[], PetscReal *size)
+void HycoBodiesSensitivityResidual(HycoBodiesFriction f, const PetscInt **row, PetscReal w[], PetscReal *size)
 {
-  HycoBodiesAlong a = f->along;
+  HycoBodiesSensitivity a = f->along;
 
   *row = f->slip.row;
   *size = f->most;
@@ -148,7 +148,7 @@ void HycoBodiesAlongRest(HycoBodiesFriction f, const PetscInt **row, PetscReal w
 /* The rows with tangents where the model's contacts are. */
 static PetscErrorCode TangentRows(HycoROM m, HycoBodiesFriction f)
 {
-  HycoBodiesAlong a = f->along;
+  HycoBodiesSensitivity a = f->along;
 
   PetscFunctionBegin;
   PetscCall(HycoContactTangentRows(m->fe, &m->pairs, f->slip.row, a->none, a->tangent, &a->rows));
@@ -156,10 +156,11 @@ static PetscErrorCode TangentRows(HycoROM m, HycoBodiesFriction f)
 }
 
 /* rows: m's contacts are those at mu. */
-PetscErrorCode HycoBodiesAlongNear(HycoROM m, HycoBodiesFriction f, const PetscReal mu[], const PetscInt row[],
-                                   PetscBool rows, const PetscReal z[], PetscInt point, PetscReal w[])
+PetscErrorCode HycoBodiesSensitivityPerturbed(HycoROM m, HycoBodiesFriction f, const PetscReal mu[],
+                                              const PetscInt row[], PetscBool rows, const PetscReal z[], PetscInt point,
+                                              PetscReal w[])
 {
-  HycoBodiesAlong a = f->along;
+  HycoBodiesSensitivity a = f->along;
   HycoBodiesSurface s = f->all;
 
   PetscFunctionBegin;
@@ -182,10 +183,11 @@ PetscErrorCode HycoBodiesAlongNear(HycoROM m, HycoBodiesFriction f, const PetscR
 }
 
 /* point[0]: the path itself. */
-PetscErrorCode HycoBodiesAlongStep(HycoBodiesFriction f, PetscInt parameter, const PetscReal weight[3],
-                                   const PetscInt point[3], const PetscReal q[], PetscReal dz[], PetscBool *regular)
+PetscErrorCode HycoBodiesSensitivityAdvance(HycoBodiesFriction f, PetscInt parameter, const PetscReal weight[3],
+                                            const PetscInt point[3], const PetscReal q[], PetscReal dz[],
+                                            PetscBool *regular)
 {
-  HycoBodiesAlong a = f->along;
+  HycoBodiesSensitivity a = f->along;
   const PetscInt n = f->all.n, p = f->p;
   const HycoLCP lcp = {.n = n, .p = p, .M = f->M, .blocks = f->blocks, .cone = f->factor};
   PetscReal *dmu = a->mu; /* in place of the path's own */
@@ -201,9 +203,9 @@ PetscErrorCode HycoBodiesAlongStep(HycoBodiesFriction f, PetscInt parameter, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void HycoBodiesAlongTake(HycoBodiesFriction f, PetscInt parameter, const PetscReal dz[])
+void HycoBodiesSensitivityAccept(HycoBodiesFriction f, PetscInt parameter, const PetscReal dz[])
 {
-  HycoBodiesAlong a = f->along;
+  HycoBodiesSensitivity a = f->along;
   const PetscInt n = f->all.n, p = f->p;
   const PetscReal *r = f->z + p;
   PetscReal *slip = a->slip + parameter * n, *work = a->work + parameter * f->slip.n;
@@ -219,10 +221,10 @@ void HycoBodiesAlongTake(HycoBodiesFriction f, PetscInt parameter, const PetscRe
   }
 }
 
-PetscErrorCode HycoBodiesAlongShow(HycoROM m, HycoBodiesFriction f, PetscInt parameter, PetscBool rows, PetscReal step,
-                                   const PetscReal dz[])
+PetscErrorCode HycoBodiesSensitivityView(HycoROM m, HycoBodiesFriction f, PetscInt parameter, PetscBool rows,
+                                         PetscReal step, const PetscReal dz[])
 {
-  HycoBodiesAlong a = f->along;
+  HycoBodiesSensitivity a = f->along;
   const PetscReal *work = a->work + parameter * f->slip.n, *tangent = rows ? a->tangent : f->slip.tangent;
   HycoShear shear = m->trace.seen;
 

@@ -1,21 +1,21 @@
 /*
-  What the steps of a path hand on of their derivatives by the parameters. Elastic bodies have no memory but that of their
-  contacts with friction: the slips of a step count from the surfaces' places at its begin, whose derivatives are those of
-  the step before. Laws that flow count from their states at its begin. With K = d f_int / dU at the end of the step, the
-  derivatives of f_int at fixed U, of the states and of the stresses are differences of the laws at points beside the
-  parameters, from states that are moved along their derivatives.
+  What the steps of a path hand on of their derivatives by the parameters. Elastic bodies have no memory but that of
+  their contacts with friction: the slips of a step count from the surfaces' places at its begin, whose derivatives are
+  those of the step before. Laws that flow count from their states at its begin. With K = d f_int / dU at the end of the
+  step, the derivatives of f_int at fixed U, of the states and of the stresses are differences of the laws at points
+  beside the parameters, from states that are moved along their derivatives.
 */
-#include "along.h"
+#include "sensitivity_step.h"
 #include <hycoentries.h>
 #include <hycomaterialimpl.h>
 
 #define JUMP                                                                                                           \
   1e-3 /* share of the largest slope of a stress by which those to the two sides differ, if it is no curvature */
 
-struct _n_HycoAlong {
+struct _n_HycoSensitivityStep {
   HycoFOM f;
   PetscReal t0;             /* the begin of the step */
-  PetscBool rubs;           /* the path has tangents in it */
+  PetscBool has_friction;   /* the path has tangents in it */
   PetscInt n_dof;           /* of the surface, with friction: */
   PetscReal *u_old, *moved; /* its place at the begin of the step; beside it */
   PetscReal *du_old, *du;   /* the derivatives, n_dof for each parameter: at the begin, at the end */
@@ -36,7 +36,7 @@ struct _n_HycoAlong {
 };
 
 /* Room for the laws' states. The path that is solved again stands at the end of the one before. */
-static PetscErrorCode CreateStates(HycoAlong a)
+static PetscErrorCode CreateStates(HycoSensitivityStep a)
 {
   const HycoPath p = a->f->path;
   const HycoFE fe = p->fe;
@@ -57,10 +57,10 @@ static PetscErrorCode CreateStates(HycoAlong a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoAlongCreate(HycoFOM f, HycoAlong *along)
+PetscErrorCode HycoSensitivityCreate(HycoFOM f, HycoSensitivityStep *along)
 {
   const PetscInt np = f->scene->n_parameters, n = f->pairs.n;
-  HycoAlong a;
+  HycoSensitivityStep a;
 
   PetscFunctionBegin;
   PetscCall(PetscNew(along));
@@ -81,7 +81,7 @@ PetscErrorCode HycoAlongCreate(HycoFOM f, HycoAlong *along)
 }
 
 /* Outputs are those of the path again. */
-static void ShowPath(HycoAlong a)
+static void ShowPath(HycoSensitivityStep a)
 {
   HycoPath p = a->f->path;
 
@@ -95,9 +95,9 @@ static void ShowPath(HycoAlong a)
 }
 
 /* Also after an error. */
-PetscErrorCode HycoAlongDestroy(HycoAlong *along)
+PetscErrorCode HycoSensitivityDestroy(HycoSensitivityStep *along)
 {
-  HycoAlong a = *along;
+  HycoSensitivityStep a = *along;
 
   PetscFunctionBegin;
   if (!a) PetscFunctionReturn(PETSC_SUCCESS);
@@ -111,7 +111,7 @@ PetscErrorCode HycoAlongDestroy(HycoAlong *along)
 }
 
 /* The derivatives need a tangent that is exact, as those of the laws which have derivatives themselves. */
-static PetscBool Able(HycoScene s)
+static PetscBool LawsHaveDerivatives(HycoScene s)
 {
   for (PetscInt b = 0; b < s->n_bodies; b++) {
     if (!s->body[b].law->linear && !s->body[b].law->slopes) return PETSC_FALSE;
@@ -121,7 +121,8 @@ static PetscBool Able(HycoScene s)
 
 /* The laws from the begin of the step, moved by step along its derivative, to u; f_int in the path's f_local. The path
    exchanges its states when it accepts a step: the one at its begin is now the room of the next end. Not collective. */
-static PetscErrorCode RunLaws(HycoAlong a, PetscInt parameter, PetscReal step, PetscReal u[], PetscBool tangent)
+static PetscErrorCode RunLaws(HycoSensitivityStep a, PetscInt parameter, PetscReal step, PetscReal u[],
+                              PetscBool tangent)
 {
   const HycoPath p = a->f->path;
   const HycoFE fe = p->fe;
@@ -148,7 +149,7 @@ static PetscErrorCode RunLaws(HycoAlong a, PetscInt parameter, PetscReal step, P
 }
 
 /* The same to U, whose fixed unknowns follow the parameters. Collective. */
-static PetscErrorCode RunTo(HycoAlong a, PetscInt parameter, PetscReal step, Vec U, PetscBool tangent)
+static PetscErrorCode RunTo(HycoSensitivityStep a, PetscInt parameter, PetscReal step, Vec U, PetscBool tangent)
 {
   PetscReal *u;
 
@@ -161,7 +162,7 @@ static PetscErrorCode RunTo(HycoAlong a, PetscInt parameter, PetscReal step, Vec
 }
 
 /* K = d f_int / dU at the end of the step; what the path had is kept, so that it goes on with it. Collective. */
-static PetscErrorCode StandOnTangent(HycoAlong a, PetscBool *able)
+static PetscErrorCode LineariseTangent(HycoSensitivityStep a, PetscBool *able)
 {
   const HycoPath p = a->f->path;
 
@@ -173,12 +174,12 @@ static PetscErrorCode StandOnTangent(HycoAlong a, PetscBool *able)
   PetscCall(RunTo(a, 0, 0, p->U, PETSC_TRUE));
   PetscCall((*p->ops->stiffness)(p));
   /* The pieces of friction are those of a solution. */
-  if (p->rubs) PetscCall(HycoPathSolveAgain(p, able));
+  if (p->has_friction) PetscCall(HycoPathSolveAgain(p, able));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The path has its own K again. */
-static PetscErrorCode LeaveTangent(HycoAlong a)
+static PetscErrorCode LeaveTangent(HycoSensitivityStep a)
 {
   const HycoPath p = a->f->path;
 
@@ -188,36 +189,37 @@ static PetscErrorCode LeaveTangent(HycoAlong a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoAlongStep(HycoAlong a, PetscReal t0, PetscBool *able)
+PetscErrorCode HycoSensitivityAdvance(HycoSensitivityStep a, PetscReal t0, PetscBool *able)
 {
   const HycoPath p = a->f->path;
   PetscBool moves = PETSC_FALSE;
 
   PetscFunctionBegin;
   a->t0 = t0;
-  a->rubs = p->rubs;
+  a->has_friction = p->has_friction;
   if (a->f->friction) PetscCall(HycoFrictionMoves(a->f, &moves));
-  *able = (PetscBool)(!moves && !p->solver->iterative && Able(p->scene));
+  *able = (PetscBool)(!moves && !p->solver->iterative && LawsHaveDerivatives(p->scene));
   if (*able && p->flows) {
-    PetscCall(StandOnTangent(a, able));
+    PetscCall(LineariseTangent(a, able));
     if (!*able) PetscCall(LeaveTangent(a));
   } else
     p->beside = p->fe->heat_is_load = *able;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscBool HycoAlongRubs(HycoAlong a)
+PetscBool HycoSensitivityHasFriction(HycoSensitivityStep a)
 {
-  return a->rubs;
+  return a->has_friction;
 }
 
-PetscBool HycoAlongFlows(HycoAlong a)
+PetscBool HycoSensitivityFlows(HycoSensitivityStep a)
 {
   return a->f->path->flows;
 }
 
 /* f_int by the points of the cells, for a tenth of the work of their stiffnesses. */
-PetscErrorCode HycoAlongImbalance(HycoAlong a, PetscInt parameter, PetscReal step, PetscReal u[], PetscReal r[])
+PetscErrorCode HycoSensitivityImbalance(HycoSensitivityStep a, PetscInt parameter, PetscReal step, PetscReal u[],
+                                        PetscReal r[])
 {
   const HycoFE fe = a->f->fe;
   const PetscReal *f_int = a->f->path->f_local;
@@ -233,7 +235,7 @@ PetscErrorCode HycoAlongImbalance(HycoAlong a, PetscInt parameter, PetscReal ste
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoAlongRows(HycoAlong a, PetscInt parameter, PetscReal step, HycoRows *rows)
+PetscErrorCode HycoSensitivityRows(HycoSensitivityStep a, PetscInt parameter, PetscReal step, HycoRows *rows)
 {
   HycoFOM f = a->f;
 
@@ -245,7 +247,7 @@ PetscErrorCode HycoAlongRows(HycoAlong a, PetscInt parameter, PetscReal step, Hy
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoAlongCoefficients(HycoAlong a, PetscReal mu[])
+PetscErrorCode HycoSensitivityCoefficients(HycoSensitivityStep a, PetscReal mu[])
 {
   HycoFOM f = a->f;
   const PetscInt *row = HycoFrictionSlip(f->friction)->row;
@@ -253,16 +255,16 @@ PetscErrorCode HycoAlongCoefficients(HycoAlong a, PetscReal mu[])
   PetscFunctionBegin;
   for (PetscInt k = 0; k < f->pairs.n; k++) {
     HycoExpr friction = f->scene->contact[f->pairs.contact[k]]->friction;
-    PetscReal *at = mu + (a->rubs ? row[k] : k);
+    PetscReal *at = mu + (a->has_friction ? row[k] : k);
 
-    for (PetscInt i = 0; a->rubs && i < row[k + 1] - row[k]; i++) at[i] = 0;
+    for (PetscInt i = 0; a->has_friction && i < row[k + 1] - row[k]; i++) at[i] = 0;
     *at = 0;
     if (friction) PetscCall(HycoExprEval(friction, f->fe_surface->mu, 1, f->fe_surface->X + 3 * f->pairs.slave[k], at));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoAlongSpend(HycoAlong a, PetscInt parameter, Vec L, Vec w, Vec dL, Vec dw)
+PetscErrorCode HycoSensitivitySpend(HycoSensitivityStep a, PetscInt parameter, Vec L, Vec w, Vec dL, Vec dw)
 {
   const HycoSlip *s = HycoFrictionSlip(a->f->friction);
   const PetscScalar *r, *g, *dr, *dg;
@@ -284,7 +286,7 @@ PetscErrorCode HycoAlongSpend(HycoAlong a, PetscInt parameter, Vec L, Vec w, Vec
 }
 
 /* The surface's displacements for the free unknowns of U, at fe's parameters. Collective. */
-static PetscErrorCode Place(HycoAlong a, Vec U, PetscReal u[])
+static PetscErrorCode SurfaceDisplacements(HycoSensitivityStep a, Vec U, PetscReal u[])
 {
   const HycoFE fe = a->f->fe_surface;
 
@@ -297,7 +299,7 @@ static PetscErrorCode Place(HycoAlong a, Vec U, PetscReal u[])
 
 /* The largest of the stresses' slopes, and of their jumps between the two sides, of this rank: v are the states at the
    parameters and at the points beside them. */
-static void MeasureJumps(HycoAlong a, const HycoDifference *d, PetscReal *const v[3], PetscReal most[2])
+static void MeasureJumps(HycoSensitivityStep a, const HycoDifference *d, PetscReal *const v[3], PetscReal most[2])
 {
   const HycoFE fe = a->f->fe;
   const PetscInt nq = HycoElementGet(fe->mesh->type)->nq, ns = fe->n_sigma, *start;
@@ -319,7 +321,7 @@ static void MeasureJumps(HycoAlong a, const HycoDifference *d, PetscReal *const 
 }
 
 /* The derivatives of the states at the end of the step, of U + step dU. */
-static PetscErrorCode TakeStates(HycoAlong a, const PetscReal mu[], const HycoDifference *d, Vec U, Vec dU,
+static PetscErrorCode TakeStates(HycoSensitivityStep a, const PetscReal mu[], const HycoDifference *d, Vec U, Vec dU,
                                  PetscBool *smooth)
 {
   HycoFOM f = a->f;
@@ -348,8 +350,8 @@ static PetscErrorCode TakeStates(HycoAlong a, const PetscReal mu[], const HycoDi
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoAlongTake(HycoAlong a, const PetscReal mu[], const HycoDifference *d, Vec U, Vec dU,
-                             PetscBool *smooth)
+PetscErrorCode HycoSensitivityAccept(HycoSensitivityStep a, const PetscReal mu[], const HycoDifference *d, Vec U,
+                                     Vec dU, PetscBool *smooth)
 {
   HycoFOM f = a->f;
   PetscReal *du = a->du + d->parameter * a->n_dof, at[HYCO_MAX_PARAMETERS];
@@ -368,7 +370,7 @@ PetscErrorCode HycoAlongTake(HycoAlong a, const PetscReal mu[], const HycoDiffer
   if (!HycoSceneSupportsChange(f->scene, NULL, changed, moves)) {
     for (PetscInt j = 0; j < 2; j++) {
       PetscCall(VecWAXPY(V, d->step[j], dU, U));
-      PetscCall(Place(a, V, a->moved));
+      PetscCall(SurfaceDisplacements(a, V, a->moved));
       for (PetscInt k = 0; k < a->n_dof; k++) du[k] += (j ? 1 : -1) * a->moved[k] / d->step[1];
     }
   } else {
@@ -376,7 +378,7 @@ PetscErrorCode HycoAlongTake(HycoAlong a, const PetscReal mu[], const HycoDiffer
       HycoDifferencePoint(d, f->scene, mu, j, at);
       PetscCall(HycoFOMSetParameters(f, at));
       PetscCall(VecWAXPY(V, d->step[j], dU, U));
-      PetscCall(Place(a, V, a->moved));
+      PetscCall(SurfaceDisplacements(a, V, a->moved));
       for (PetscInt k = 0; k < a->n_dof; k++) du[k] += d->weight[j] * a->moved[k];
     }
   }
@@ -385,17 +387,17 @@ PetscErrorCode HycoAlongTake(HycoAlong a, const PetscReal mu[], const HycoDiffer
 }
 
 /* Those of a->tangent where the contacts are now. */
-static PetscErrorCode Tangents(HycoAlong a)
+static PetscErrorCode StepTangentRows(HycoSensitivityStep a)
 {
   HycoRows rows = {0};
 
   PetscFunctionBegin;
-  HycoFinally(HycoAlongRows(a, 0, 0, &rows), PetscCall(HycoRowsDestroy(&rows)));
+  HycoFinally(HycoSensitivityRows(a, 0, 0, &rows), PetscCall(HycoRowsDestroy(&rows)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The state and f_int of the path are those of f->U. */
-static PetscErrorCode ShowState(HycoAlong a, PetscInt parameter, PetscReal step)
+static PetscErrorCode ShowState(HycoSensitivityStep a, PetscInt parameter, PetscReal step)
 {
   HycoFOM f = a->f;
   HycoPath p = f->path;
@@ -420,7 +422,7 @@ static PetscErrorCode ShowState(HycoAlong a, PetscInt parameter, PetscReal step)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoAlongShow(HycoAlong a, PetscInt parameter, PetscReal step, Vec L, Vec dL)
+PetscErrorCode HycoSensitivityView(HycoSensitivityStep a, PetscInt parameter, PetscReal step, Vec L, Vec dL)
 {
   HycoFOM f = a->f;
   const HycoSlip *s = f->friction ? HycoFrictionSlip(f->friction) : NULL;
@@ -429,12 +431,12 @@ PetscErrorCode HycoAlongShow(HycoAlong a, PetscInt parameter, PetscReal step, Ve
   PetscFunctionBegin;
   if (f->path->flows) PetscCall(ShowState(a, parameter, step));
   if (!s) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoOnEach(HycoComm(f), Tangents(a));
+  HycoOnEach(HycoComm(f), StepTangentRows(a));
   PetscCall(VecGetArrayRead(L, &r));
   PetscCall(VecGetArrayRead(dL, &dr));
   for (PetscInt k = 0; k < s->n; k++) {
     for (PetscInt c = 0; c < 3; c++) a->force[3 * k + c] = 0;
-    for (PetscInt i = s->row[k] + 1; i < s->row[k + 1] && a->rubs; i++) {
+    for (PetscInt i = s->row[k] + 1; i < s->row[k + 1] && a->has_friction; i++) {
       const PetscReal *t = a->tangent + 6 * k + 3 * (i - s->row[k] - 1);
 
       for (PetscInt c = 0; c < 3; c++) a->force[3 * k + c] -= (r[i] + step * dr[i]) * t[c];
@@ -450,7 +452,7 @@ PetscErrorCode HycoAlongShow(HycoAlong a, PetscInt parameter, PetscReal step, Ve
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoAlongEnd(HycoAlong a)
+PetscErrorCode HycoSensitivityEnd(HycoSensitivityStep a)
 {
   HycoFOM f = a->f;
   HycoPath p = f->path;
@@ -464,7 +466,7 @@ PetscErrorCode HycoAlongEnd(HycoAlong a)
     a->dstate = dstate;
   }
   if (!f->friction) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Place(a, f->U, a->u_old));
+  PetscCall(SurfaceDisplacements(a, f->U, a->u_old));
   a->du_old = a->du;
   a->du = du;
   PetscFunctionReturn(PETSC_SUCCESS);

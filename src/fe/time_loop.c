@@ -2,10 +2,10 @@
 #include <hycoinelastic.h>
 
 /* Two states that alternate as begin and end, so that a step copies nothing. */
-PetscErrorCode HycoMarchBegin(HycoFE fe, HycoMarch *m)
+PetscErrorCode HycoTimeLoopBegin(HycoFE fe, HycoTimeLoop *m)
 {
   PetscFunctionBegin;
-  *m = (HycoMarch){.fe = fe};
+  *m = (HycoTimeLoop){.fe = fe};
   PetscCall(HycoFEStateCreate(fe, &m->state));
   PetscCall(HycoFEStateCreate(fe, &m->end));
   PetscCall(PetscCalloc1(fe->n_dof, &m->f_int));
@@ -13,7 +13,8 @@ PetscErrorCode HycoMarchBegin(HycoFE fe, HycoMarch *m)
 }
 
 /* One step without tangents: u is known, and no equilibrium is solved. The internal forces stay in m->f_int (n_dof). */
-PetscErrorCode HycoMarchStep(HycoMarch *m, const PetscReal u[], PetscReal t0, PetscReal t1, HycoFEStepReport *report)
+PetscErrorCode HycoTimeLoopStep(HycoTimeLoop *m, const PetscReal u[], PetscReal t0, PetscReal t1,
+                                HycoFEStepReport *report)
 {
   const HycoFEState state = m->state;
 
@@ -26,8 +27,8 @@ PetscErrorCode HycoMarchStep(HycoMarch *m, const PetscReal u[], PetscReal t0, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Frees what HycoMarchBegin() allocated, also after a failed step. */
-PetscErrorCode HycoMarchEnd(HycoMarch *m)
+/* Frees what HycoTimeLoopBegin() allocated, also after a failed step. */
+PetscErrorCode HycoTimeLoopEnd(HycoTimeLoop *m)
 {
   PetscFunctionBegin;
   PetscCall(HycoFEStateDestroy(&m->state));

@@ -1,12 +1,12 @@
 /* Given gaps whose sign is probably wrong: a contact that overlaps everywhere, and deeply. */
-#include "facing.h"
+#include "surface_normals.h"
 
 /* Share of a body's extent. Parts are fitted with interferences of 0.05 to 0.3 % of their diameter, and metals yield
    beyond; an overlap of 1 % at every node is hardly meant, while a clearance of this size is common. */
-#define BURIED 0.01
+#define OVERLAP_SHARE 0.01
 
 /* The extents of the bodies (the diagonals of their boxes) at the present positions, over all ranks. */
-static PetscErrorCode Extents(MPI_Comm comm, HycoFE fe, PetscReal extent[])
+static PetscErrorCode OverlapBodySizes(MPI_Comm comm, HycoFE fe, PetscReal extent[])
 {
   const PetscInt n = fe->scene->n_bodies;
   PetscReal *box;
@@ -33,7 +33,8 @@ static PetscErrorCode Extents(MPI_Comm comm, HycoFE fe, PetscReal extent[])
 }
 
 /* For each contact of the scene: its largest gap, and minus the smallest extent of its bodies. */
-static void Gather(HycoFE fe, const HycoPairs *p, const PetscReal gap[], const PetscReal extent[], PetscReal most[])
+static void OverlapGather(HycoFE fe, const HycoPairs *p, const PetscReal gap[], const PetscReal extent[],
+                          PetscReal most[])
 {
   HycoMesh m = fe->mesh;
 
@@ -49,8 +50,8 @@ static void Gather(HycoFE fe, const HycoPairs *p, const PetscReal gap[], const P
 }
 
 /* By the smallest overlap of a contact, not the largest: a rounded obstacle may reach deep at one node. */
-PetscErrorCode HycoContactBuried(MPI_Comm comm, HycoFE fe, HycoFE surface, const HycoPairs *pairs,
-                                 const PetscReal gap[], PetscReal share[])
+PetscErrorCode HycoContactInitialOverlap(MPI_Comm comm, HycoFE fe, HycoFE surface, const HycoPairs *pairs,
+                                         const PetscReal gap[], PetscReal share[])
 {
   HycoScene s = fe->scene;
   PetscReal *extent, *most;
@@ -65,14 +66,14 @@ PetscErrorCode HycoContactBuried(MPI_Comm comm, HycoFE fe, HycoFE surface, const
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc2(s->n_bodies, &extent, 2 * s->n_contacts, &most));
   for (PetscInt k = 0; k < 2 * s->n_contacts; k++) most[k] = -PETSC_MAX_REAL;
-  PetscCall(Extents(comm, fe, extent));
-  Gather(surface, pairs, gap, extent, most);
+  PetscCall(OverlapBodySizes(comm, fe, extent));
+  OverlapGather(surface, pairs, gap, extent, most);
   HycoAllreduce(most, 2 * s->n_contacts, MPIU_REAL, MPI_MAX, comm);
   for (PetscInt c = 0; c < s->n_contacts; c++) {
     const PetscReal *of = most + 2 * c;
 
     if (!s->contact[c]->gap || s->contact[c]->ops->gap || of[0] == -PETSC_MAX_REAL || !(of[1] < 0)) continue;
-    if (of[0] < BURIED * of[1]) share[c] = of[0] / of[1];
+    if (of[0] < OVERLAP_SHARE * of[1]) share[c] = of[0] / of[1];
   }
   PetscCall(PetscFree2(extent, most));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,5 +1,5 @@
 /* Normals, sizes and areas of surfaces on moved nodes. */
-#include "facing.h"
+#include "surface_normals.h"
 #include <hycocarriers.h>
 #include <hycokinematics.h>
 #include <hycovector.h>
@@ -126,7 +126,7 @@ PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
 
 /* The part of each node (share, n_nodes) in the area of the surface `group`. Shares add up to the area of the surface,
    those of tied nodes included, as PassTied() hands them on. */
-static PetscErrorCode Shares(HycoFE fe, PetscInt group, PetscReal share[])
+static PetscErrorCode SurfaceNormalShares(HycoFE fe, PetscInt group, PetscReal share[])
 {
   HycoMesh m = fe->mesh;
   const HycoElement *el = HycoElementGetFacet(m->type);
@@ -165,7 +165,7 @@ PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, const PetscRe
 
     next = HycoPairsRun(pairs, k);
     PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &g));
-    PetscCall(Shares(fe, g, share));
+    PetscCall(SurfaceNormalShares(fe, g, share));
     for (PetscInt i = k; i < next; i++) area[i] = share[pairs->slave[i]];
     if (!HycoContactAverages(c))
       PetscCall(HycoSidesFacing(fe, g, next - k, pairs->slave + k, normal + 3 * k, NULL, area + k));

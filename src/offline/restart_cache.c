@@ -1,7 +1,7 @@
 /*
-  Finished pieces of a training that are no solutions: results of a body's factor, in files of the store's folder until the
-  model is written. An interrupted training finds those that it had finished. A file is named by a hash of all that the
-  piece follows from, so that a piece of other settings is another file; it is complete or absent.
+  Finished pieces of a training that are no solutions: results of a body's factor, in files of the store's folder until
+  the model is written. An interrupted training finds those that it had finished. A file is named by a hash of all that
+  the piece follows from, so that a piece of other settings is another file; it is complete or absent.
 */
 #include <hycofile.h>
 #include <hycosnapshotsimpl.h>
@@ -13,9 +13,9 @@
 
 unsigned long long HycoPieceAdd(unsigned long long key, size_t bytes, const void *data)
 {
-  unsigned char seal[HYCO_SEAL];
+  unsigned char seal[HYCO_CHECKSUM];
 
-  HycoSealMake(data, bytes, seal);
+  HycoChecksumMake(data, bytes, seal);
   return HycoHash(key, seal, sizeof(seal));
 }
 
@@ -40,7 +40,7 @@ static PetscErrorCode PiecePath(HycoSnapshots s, unsigned long long key, char pa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Open(HycoSnapshots s, const char path[], HycoH5 *h)
+static PetscErrorCode RestartCacheOpen(HycoSnapshots s, const char path[], HycoH5 *h)
 {
   PetscFunctionBegin;
   PetscCall(HycoH5OpenOr(path, "remove it and run again", h));
@@ -65,13 +65,13 @@ static PetscErrorCode CheckFolder(HycoSnapshots s)
   }
   if (folder) closedir(folder);
   if (!path[0]) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Open(s, path, &h));
+  PetscCall(RestartCacheOpen(s, path, &h));
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Notes a file that the end of the training removes. The first one of a run looks at what is there. Rank 0. */
-static PetscErrorCode Note(HycoSnapshots s, unsigned long long key)
+static PetscErrorCode RestartCacheNote(HycoSnapshots s, unsigned long long key)
 {
   PetscFunctionBegin;
   if (!s->n_pieces) PetscCall(CheckFolder(s));
@@ -81,7 +81,8 @@ static PetscErrorCode Note(HycoSnapshots s, unsigned long long key)
 }
 
 /* first[k]: of this rank's rows of array k; all[k]: rows of all ranks. Collective. */
-static PetscErrorCode Place(MPI_Comm comm, PetscInt n, const HycoPieceArray array[], PetscInt first[], PetscInt all[])
+static PetscErrorCode RestartCacheRows(MPI_Comm comm, PetscInt n, const HycoPieceArray array[], PetscInt first[],
+                                       PetscInt all[])
 {
   PetscFunctionBegin;
   for (PetscInt k = 0; k < n; k++) {
@@ -96,8 +97,8 @@ static PetscErrorCode Place(MPI_Comm comm, PetscInt n, const HycoPieceArray arra
 static const char *const names[HYCO_PIECE_ARRAYS] = {"a", "b", "c", "d"};
 
 /* This rank's rows. */
-static PetscErrorCode Read(HycoSnapshots s, const char path[], PetscInt n, const HycoPieceArray array[],
-                           const PetscInt first[])
+static PetscErrorCode RestartCacheRead(HycoSnapshots s, const char path[], PetscInt n, const HycoPieceArray array[],
+                                       const PetscInt first[])
 {
   HycoH5 h;
   PetscErrorCode ierr = PETSC_SUCCESS;
@@ -106,7 +107,7 @@ static PetscErrorCode Read(HycoSnapshots s, const char path[], PetscInt n, const
   PetscFunctionBegin;
   for (PetscInt k = 0; k < n; k++) rows += array[k].n;
   if (!rows) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Open(s, path, &h));
+  PetscCall(RestartCacheOpen(s, path, &h));
   for (PetscInt k = 0; k < n && !ierr; k++) ierr = HycoH5ReadRows(h, names[k], first[k], array[k].n, 1, array[k].value);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscCall(ierr);
@@ -122,18 +123,18 @@ PetscErrorCode HycoSnapshotsFindPiece(HycoSnapshots s, unsigned long long key, P
   PetscFunctionBegin;
   PetscCallMPI(MPI_Bcast(&key, 1, MPI_UNSIGNED_LONG_LONG, 0, HycoComm(s)));
   PetscCall(PiecePath(s, key, path));
-  HycoOnRoot(HycoComm(s), Note(s, key));
+  HycoOnRoot(HycoComm(s), RestartCacheNote(s, key));
   /* One rank looks into the folder: others might see it in another state. */
   *found = (PetscBool)(HycoRank(HycoComm(s)) == 0 && access(path, F_OK) == 0);
   PetscCallMPI(MPI_Bcast(found, 1, HYCO_MPI_BOOL, 0, HycoComm(s)));
   if (!*found) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Place(HycoComm(s), n, array, first, all));
-  HycoOnEach(HycoComm(s), Read(s, path, n, array, first));
+  PetscCall(RestartCacheRows(HycoComm(s), n, array, first, all));
+  HycoOnEach(HycoComm(s), RestartCacheRead(s, path, n, array, first));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The fingerprint, by which a file of another scene is refused, then the arrays. Collective. */
-static PetscErrorCode Write(HycoSnapshots s, HycoH5 h, PetscInt n, const HycoPieceArray array[])
+static PetscErrorCode RestartCacheWrite(HycoSnapshots s, HycoH5 h, PetscInt n, const HycoPieceArray array[])
 {
   PetscInt first[HYCO_PIECE_ARRAYS], all[HYCO_PIECE_ARRAYS];
   char fingerprint[32];
@@ -141,7 +142,7 @@ static PetscErrorCode Write(HycoSnapshots s, HycoH5 h, PetscInt n, const HycoPie
   PetscFunctionBegin;
   snprintf(fingerprint, sizeof(fingerprint), "%016llx", s->fingerprint);
   HycoOnRoot(HycoComm(s), HycoH5WriteText(h, "fingerprint", fingerprint));
-  PetscCall(Place(HycoComm(s), n, array, first, all));
+  PetscCall(RestartCacheRows(HycoComm(s), n, array, first, all));
   for (PetscInt k = 0; k < n; k++) {
     if (all[k]) PetscCall(HycoH5WriteRows(h, names[k], MPIU_REAL, all[k], 1, first[k], array[k].n, array[k].value));
   }
@@ -158,7 +159,7 @@ PetscErrorCode HycoSnapshotsKeepPiece(HycoSnapshots s, unsigned long long key, P
   PetscCallMPI(MPI_Bcast(&key, 1, MPI_UNSIGNED_LONG_LONG, 0, HycoComm(s)));
   PetscCall(PiecePath(s, key, path));
   PetscCall(HycoH5CreateShared(HycoComm(s), path, &h));
-  ierr = Write(s, h, n, array);
+  ierr = RestartCacheWrite(s, h, n, array);
   failed = HycoH5Close(&h, (PetscBool)!ierr);
   PetscCall(ierr ? ierr : failed);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -28,7 +28,7 @@ static void StoreWord(unsigned long long word, unsigned char byte[8])
 /* FNV-1a by words instead of bytes (eight times as fast), the rest by bytes. Each step is a bijection of the hash and
    of the word: damage within one word is always detected. `bytes` is a multiple of 8, except in the last call. No
    protection against intent, only against damage: truncated copies, bad disks. */
-static unsigned long long Sum(unsigned long long sum, const unsigned char *data, size_t bytes)
+static unsigned long long ChecksumSum(unsigned long long sum, const unsigned char *data, size_t bytes)
 {
   size_t k = 0;
 
@@ -40,22 +40,22 @@ static unsigned long long Sum(unsigned long long sum, const unsigned char *data,
 }
 
 /* Magic number, length, checksum: a file that was cut, extended or changed in any bit does not match. */
-void HycoSealMake(const void *data, size_t bytes, unsigned char seal[HYCO_SEAL])
+void HycoChecksumMake(const void *data, size_t bytes, unsigned char seal[HYCO_CHECKSUM])
 {
   memcpy(seal, magic, 8);
   StoreWord((unsigned long long)bytes, seal + 8);
-  StoreWord(Sum(HYCO_HASH_START, (const unsigned char *)data, bytes), seal + 16);
+  StoreWord(ChecksumSum(HYCO_HASH_START, (const unsigned char *)data, bytes), seal + 16);
 }
 
 /* The seal at the end of an open file of `size` bytes, if it has one. */
-static PetscBool ReadSeal(FILE *file, long long size, unsigned char seal[HYCO_SEAL])
+static PetscBool ReadChecksum(FILE *file, long long size, unsigned char seal[HYCO_CHECKSUM])
 {
-  return (PetscBool)(size >= HYCO_SEAL && fseek(file, (long)(size - HYCO_SEAL), SEEK_SET) == 0 &&
-                     fread(seal, 1, HYCO_SEAL, file) == HYCO_SEAL && memcmp(seal, magic, 8) == 0);
+  return (PetscBool)(size >= HYCO_CHECKSUM && fseek(file, (long)(size - HYCO_CHECKSUM), SEEK_SET) == 0 &&
+                     fread(seal, 1, HYCO_CHECKSUM, file) == HYCO_CHECKSUM && memcmp(seal, magic, 8) == 0);
 }
 
 /* The checksum of the first `left` bytes of an open file. In pieces, since a model may be larger than the memory
-   left; the piece's size is a multiple of 8, as Sum() needs. */
+   left; the piece's size is a multiple of 8, as ChecksumSum() needs. */
 static unsigned long long SumFile(FILE *file, size_t left)
 {
   unsigned char buffer[65536];
@@ -66,14 +66,14 @@ static unsigned long long SumFile(FILE *file, size_t left)
   /* A file that became shorter ends the loop; its sum then differs. */
   while (left && n) {
     n = fread(buffer, 1, PetscMin(left, sizeof(buffer)), file);
-    sum = Sum(sum, buffer, n);
+    sum = ChecksumSum(sum, buffer, n);
     left -= n;
   }
   return sum;
 }
 
 /* Folders and devices can be opened too; only a file has a size and a seal. */
-static PetscErrorCode Open(const char path[], FILE **file, size_t *size)
+static PetscErrorCode ChecksumOpen(const char path[], FILE **file, size_t *size)
 {
   struct stat info;
 
@@ -89,12 +89,12 @@ static PetscErrorCode Open(const char path[], FILE **file, size_t *size)
 }
 
 /* Magic word, size, checksum: the size alone finds most truncated files at once. */
-PetscErrorCode HycoSealFile(const char path[], size_t *size, unsigned char seal[HYCO_SEAL])
+PetscErrorCode HycoChecksumFile(const char path[], size_t *size, unsigned char seal[HYCO_CHECKSUM])
 {
   FILE *file;
 
   PetscFunctionBegin;
-  PetscCall(Open(path, &file, size));
+  PetscCall(ChecksumOpen(path, &file, size));
   memcpy(seal, magic, 8);
   StoreWord((unsigned long long)*size, seal + 8);
   StoreWord(SumFile(file, *size), seal + 16);
@@ -103,18 +103,18 @@ PetscErrorCode HycoSealFile(const char path[], size_t *size, unsigned char seal[
 }
 
 /* A file without a seal is valid here: HycoH5Open() decides whether it should have one. */
-PetscErrorCode HycoSealCheck(const char path[], size_t *size, PetscBool *sealed)
+PetscErrorCode HycoChecksumCheck(const char path[], size_t *size, PetscBool *sealed)
 {
-  unsigned char seal[HYCO_SEAL];
+  unsigned char seal[HYCO_CHECKSUM];
   unsigned long long sum = 0;
   FILE *file;
 
   PetscFunctionBegin;
-  PetscCall(Open(path, &file, size));
-  *sealed = ReadSeal(file, (long long)*size, seal);
-  if (*sealed) sum = SumFile(file, *size - HYCO_SEAL);
+  PetscCall(ChecksumOpen(path, &file, size));
+  *sealed = ReadChecksum(file, (long long)*size, seal);
+  if (*sealed) sum = SumFile(file, *size - HYCO_CHECKSUM);
   fclose(file);
-  if (*sealed && (LoadWord(seal + 8) != *size - HYCO_SEAL || LoadWord(seal + 16) != sum))
+  if (*sealed && (LoadWord(seal + 8) != *size - HYCO_CHECKSUM || LoadWord(seal + 16) != sum))
     HycoFail("%s is damaged: its checksum does not match", path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
