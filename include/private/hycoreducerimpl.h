@@ -171,10 +171,11 @@ PetscErrorCode HycoReducerSetColumns(HycoReducer t, HycoSamples columns);
 PetscErrorCode HycoReducerSolve(HycoReducer t, HycoSnapshots store, HycoSamples points);
 /* Frees the data of one run. */
 PetscErrorCode HycoReducerReset(HycoReducer t);
-/* Sets a registered type, with its options; the present one may stay. */
-/* The training of a type; fails without one. The names of the types with one, in order; NULL ends. */
+/* The names of the types with a training, in order; NULL ends. */
 PetscErrorCode HycoTrainerNames(const char *const **names);
+/* The training of a type; fails without one. */
 PetscErrorCode HycoTrainerFind(HycoROMType type, HycoTrainerOps *ops);
+/* Sets a registered type, with its options; the present one may stay. */
 PetscErrorCode HycoReducerSetType(HycoReducer t, HycoROMType type);
 /* Empirical cubature (cubature_weights.c): from the left singular vectors W (n_cells x n, rows in the file's order) and
    singular values of the cells' contributions. The weights of all cells of the whole mesh (w: n_cells, on rank 0;
@@ -331,8 +332,7 @@ PetscErrorCode HycoReducerCorners(HycoReducer reducer, PetscInt most, HycoSample
 /* Result of a model at one held-out point, all PetscReal: errors (those of forces before division), for a path at
    its worst time, and at its end; the norms of forces and stress, whether it converged, the number of its group
    (calibrate.c), the features of the estimates, the time of some repetitions; 1 if the position of a body is arbitrary,
-   and
-  displacements are not judged. */
+   and displacements are not judged. */
 #define HYCO_HELD_REPEATS 3
 typedef struct _n_HycoHeldOut {
   PetscReal error[HYCO_N_ERRORS], end[HYCO_N_ERRORS], size, rid_size, stress, converged, group, feature[HYCO_FEATURES],

@@ -434,85 +434,112 @@ static void TakeSolved(const HycoFlowRule *rule, const HycoMaterialPoints *m, Pe
   s->yields = FlowIsYielding(rule, s);
 }
 
-/* Along direction d: the derivatives of q + H (creep + plastic) = q_tr, and of q = Y where plastic strain flows. */
-static void FlowDerivative(const HycoFlowRule *rule, const HycoMaterialPoints *m, PetscInt i, const Solved *s,
-                           HycoMaterialDerivative *d)
+/* Shear and bulk modulus, Young's modulus and the factor H of flow, with their changes along a direction. */
+typedef struct {
+  PetscReal young, dyoung, G, dG, bulk, dbulk, H, dH;
+} Moduli;
+
+static void FlowModuli(const HycoMaterialPoints *m, PetscInt i, const Solved *s, const HycoMaterialDerivative *d,
+                       Moduli *E)
+{
+  const PetscReal poisson = m->constant[1][i], dpoisson = d->constant ? d->constant[1][i] : 0;
+
+  E->young = m->constant[0][i];
+  E->dyoung = d->constant ? d->constant[0][i] : 0;
+  E->G = s->G;
+  E->bulk = s->bulk;
+  E->dG = s->G * (E->dyoung / E->young - dpoisson / (1 + poisson));
+  E->dbulk = s->bulk * (E->dyoung / E->young + 2 * dpoisson / (1 - 2 * poisson));
+  E->H = s->w.H;
+  E->dH = m->n_strain == 1 ? E->dyoung : 3 * E->dG;
+}
+
+/* d (C e) = C de + dC e, of a strain e and its change: its deviator, to which the part of the traces is added. */
+static PetscReal FlowStressChange(const Moduli *E, PetscInt ns, PetscInt c, const PetscReal e[], const PetscReal de[],
+                                  PetscReal *deviator)
+{
+  const PetscReal stiff = ns == 1 ? E->young : (c < 3 ? 2 : 1) * E->G,
+                  more = ns == 1 ? E->dyoung : (c < 3 ? 2 : 1) * E->dG;
+  const PetscReal mean = ns > 1 && c < 3 ? 1.0 / 3 : 0;
+  PetscReal trace = 0, dtrace = 0;
+
+  for (PetscInt k = 0; k < 3 && ns > 1; k++) {
+    trace += e[k];
+    dtrace += de[k];
+  }
+  *deviator = stiff * (de[c] - mean * dtrace) + more * (e[c] - mean * trace);
+  return *deviator + (mean > 0 ? E->bulk * dtrace + E->dbulk * trace : 0);
+}
+
+/* The rates of flow along d, and how far its two sides are apart; trial: the change of the trial stress. */
+static void FlowRates(const HycoFlowRule *rule, const HycoMaterialPoints *m, PetscInt i, const Solved *s,
+                      const Moduli *E, PetscReal trial, HycoMaterialDerivative *d, PetscReal *creep, PetscReal *plastic)
 {
   const PetscInt ns = m->n_strain;
-  const PetscReal young = m->constant[0][i], poisson = m->constant[1][i], *strain = m->strain + i * ns,
-                  *state0 = m->state0 + i * (ns + 2), *dstrain = d->strain + i * ns,
-                  *dstate0 = d->state0 + i * (ns + 2);
-  const PetscReal dyoung = d->constant ? d->constant[0][i] : 0, dpoisson = d->constant ? d->constant[1][i] : 0;
-  const PetscReal dG = s->G * (dyoung / young - dpoisson / (1 + poisson)),
-                  dbulk = s->bulk * (dyoung / young + 2 * dpoisson / (1 - 2 * poisson)), H = s->w.H,
-                  dH = ns == 1 ? dyoung : 3 * dG, dp = s->creep + s->plastic;
-  PetscReal trace[4] = {0, 0, 0, 0}, dev[6], rate[6], trial = 0, by_creep, by_yield, dq, creep, plastic = 0, unit, turn;
-  PetscReal *state = d->state + i * (ns + 2), *stress = d->stress + i * ns, *lost = d->lost + i * ns;
+  const PetscReal *dstate0 = d->state0 + i * (ns + 2), H = E->H, flows = (s->creep + s->plastic) * E->dH;
+  PetscReal by_creep, by_yield, dq;
 
-  /* Traces: of the elastic strain and its change; of the whole strain and its change. */
-  for (PetscInt c = 0; c < 3 && ns > 1; c++) {
-    trace[0] += strain[c] - state0[c];
-    trace[1] += dstrain[c] - dstate0[c];
-    trace[2] += strain[c];
-    trace[3] += dstrain[c];
-  }
-  for (PetscInt c = 0; c < ns; c++) {
-    const PetscReal stiff = ns == 1 ? young : c < 3 ? 2 * s->G : s->G, more = ns == 1 ? dyoung : c < 3 ? 2 * dG : dG;
-    const PetscReal mean = ns > 1 && c < 3 ? 1.0 / 3 : 0;
-
-    /* The deviator's change; in 1D the stress's. */
-    dev[c] = stiff * (dstrain[c] - dstate0[c] - mean * trace[1]) + more * (strain[c] - state0[c] - mean * trace[0]);
-    rate[c] = (c < 3 ? 1 : 2) * s->w.s[c];
-    trial += rate[c] * dev[c];
-    /* Were the strain elastic: */
-    lost[c] = stiff * (dstrain[c] - mean * trace[3]) + more * (strain[c] - mean * trace[2]);
-    if (mean > 0) lost[c] += s->bulk * trace[3] + dbulk * trace[2];
-  }
-  /* Without a trial stress nothing flows, and q has no direction. */
-  for (PetscInt c = 0; c < ns && !(s->w.trial > 0) && s->slope > 0; c++)
-    d->apart = PetscMax(d->apart, PetscAbsReal(dev[c]));
-  trial = s->w.trial > 0 ? (ns == 1 ? 1 : 1.5) * trial / s->w.trial : 0;
+  *plastic = 0;
   ByData(rule, &s->w.p, d, i, dstate0[ns], s->q, m->state[i * (ns + 2) + ns + 1], &by_creep, &by_yield);
   if (s->yields) {
-    dq = s->hardening * (dstate0[ns + 1] + (trial - dp * dH) / H - by_creep) + by_yield;
+    dq = s->hardening * (dstate0[ns + 1] + (trial - flows) / H - by_creep) + by_yield;
     dq /= 1 + s->hardening * (1 / H + s->slope);
-    creep = s->slope * dq + by_creep;
-    plastic = (trial - dp * dH - dq) / H - creep;
+    *creep = s->slope * dq + by_creep;
+    *plastic = (trial - flows - dq) / H - *creep;
   } else {
-    dq = (trial - H * by_creep - dp * dH) / (1 + H * s->slope);
-    creep = s->slope * dq + by_creep;
+    dq = (trial - H * by_creep - flows) / (1 + H * s->slope);
+    *creep = s->slope * dq + by_creep;
   }
   d->rate = PetscMax(d->rate, PetscMax(PetscAbsReal(trial), PetscAbsReal(dq)));
   /* On the yield surface the point stays there, or its derivatives differ between the two sides. */
   if (s->yields && H * s->plastic <= BORDER * s->yield)
-    d->apart = PetscMax(d->apart, H * PetscAbsReal(plastic));
+    d->apart = PetscMax(d->apart, H * PetscAbsReal(*plastic));
   else if (!s->yields && s->yield >= 0 && s->q >= (1 - BORDER) * s->yield)
     d->apart = PetscMax(d->apart, PetscAbsReal(dq - s->hardening * dstate0[ns + 1] - by_yield));
+}
+
+/* Along direction d: the derivatives of q + H (creep + plastic) = q_tr, and of q = Y where plastic strain flows. */
+static void FlowDerivative(const HycoFlowRule *rule, const HycoMaterialPoints *m, PetscInt i, const Solved *s,
+                           HycoMaterialDerivative *d)
+{
+  const PetscInt ns = m->n_strain, at = i * ns, at_state = i * (ns + 2);
+  const PetscReal *strain = m->strain + at, *dstrain = d->strain + at, *state0 = m->state0 + at_state,
+                  *dstate0 = d->state0 + at_state, dp = s->creep + s->plastic, *stress_s = s->w.s;
+  PetscReal *state = d->state + at_state, *stress = d->stress + at, *lost = d->lost + at;
+  PetscReal dev[6], e[6], de[6], trial = 0, creep, plastic, unit;
+  Moduli E;
+
+  FlowModuli(m, i, s, d, &E);
+  for (PetscInt c = 0; c < ns; c++) {
+    e[c] = strain[c] - state0[c];
+    de[c] = dstrain[c] - dstate0[c];
+  }
+  for (PetscInt c = 0; c < ns; c++) {
+    /* The deviator's change; in 1D the stress's. lost: were the strain elastic. */
+    (void)FlowStressChange(&E, ns, c, e, de, &dev[c]);
+    lost[c] = FlowStressChange(&E, ns, c, strain, dstrain, &unit);
+    trial += (c < 3 ? 1 : 2) * stress_s[c] * dev[c];
+    /* Without a trial stress nothing flows, and q has no direction. */
+    if (!(s->w.trial > 0) && s->slope > 0) d->apart = PetscMax(d->apart, PetscAbsReal(dev[c]));
+  }
   unit = s->w.trial > 0 ? (ns == 1 ? 1.0 : 1.5) / s->w.trial : 0;
-  turn = ns == 1 ? 0 : dp * unit;
+  trial = s->w.trial > 0 ? (ns == 1 ? 1 : 1.5) * trial / s->w.trial : 0;
+  FlowRates(rule, m, i, s, &E, trial, d, &creep, &plastic);
   for (PetscInt c = 0; c < ns; c++) {
     /* d (dp N) = d dp N + dp dN, N = 3/2 s / q_tr; in 1D N is a sign. */
-    const PetscReal N = unit * s->w.s[c], twice = c < 3 ? 1 : 2;
+    const PetscReal N = unit * stress_s[c], twice = c < 3 ? 1 : 2;
 
     state[c] = dstate0[c] + twice * ((creep + plastic) * N);
-    if (ns > 1 && s->w.trial > 0) state[c] += twice * turn * (dev[c] - s->w.s[c] * trial / s->w.trial);
+    if (ns > 1 && s->w.trial > 0) state[c] += twice * (dp * unit) * (dev[c] - stress_s[c] * trial / s->w.trial);
   }
   state[ns] = dstate0[ns] + creep;
   state[ns + 1] = dstate0[ns + 1] + plastic;
   for (PetscInt c = 0; c < ns; c++) {
-    const PetscReal stiff = ns == 1 ? young : c < 3 ? 2 * s->G : s->G, more = ns == 1 ? dyoung : c < 3 ? 2 * dG : dG;
-    const PetscReal mean = ns > 1 && c < 3 ? 1.0 / 3 : 0, *inelastic = m->state + i * (ns + 2);
-    PetscReal all = 0, sum = 0;
-
-    for (PetscInt k = 0; k < 3 && mean > 0; k++) {
-      all += state[k];
-      sum += inelastic[k];
-    }
     /* C and its change times the inelastic strain. */
-    unit = stiff * (state[c] - mean * all) + more * (inelastic[c] - mean * sum);
-    if (mean > 0) unit += s->bulk * all + dbulk * sum;
-    stress[c] = lost[c] - unit;
-    lost[c] = unit;
+    const PetscReal inelastic = FlowStressChange(&E, ns, c, m->state + at_state, state, &unit);
+
+    stress[c] = lost[c] - inelastic;
+    lost[c] = inelastic;
   }
 }
 

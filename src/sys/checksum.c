@@ -1,5 +1,5 @@
 /*
-  The seal: the last 24 bytes of a file: "hyco-sum", the length and the checksum of the bytes before it, 8 bytes each,
+  The checksum: the last 24 bytes of a file: "hyco-sum", the length and the checksum of the bytes before it, 8 bytes each,
   little-endian. HDF5 1.10 checks the structure of a file but not its numbers: a flipped bit there would change a result
   unnoticed.
 */
@@ -9,6 +9,15 @@
 #include <sys/stat.h>
 
 static const char magic[8] = {'h', 'y', 'c', 'o', '-', 's', 'u', 'm'};
+
+/* FNV-1a; also used to continue a hash. */
+unsigned long long HycoHash(unsigned long long hash, const void *data, size_t bytes)
+{
+  const unsigned char *byte = (const unsigned char *)data;
+
+  for (size_t k = 0; k < bytes; k++) hash = (hash ^ byte[k]) * 1099511628211ULL;
+  return hash;
+}
 
 /* By bytes, so that files are the same on any machine. */
 static unsigned long long LoadWord(const unsigned char byte[8])

@@ -3,7 +3,6 @@
 #include <stdlib.h>
 #include <stdarg.h>
 #include <string.h>
-#include <time.h>
 
 /* An environment variable, because errors may come before options are read. */
 PetscBool HycoWantsTrace(void)
@@ -129,31 +128,4 @@ PetscErrorCode HycoErrorSync(MPI_Comm comm, PetscErrorCode caught, const char me
   }
   if (size > 1) PetscCallMPI(MPI_Bcast(&said, sizeof(said), MPI_BYTE, first, comm));
   SETERRQ(comm, said.code, "%s", said.line);
-}
-
-/* FNV-1a; also used to continue a hash. */
-unsigned long long HycoHash(unsigned long long hash, const void *data, size_t bytes)
-{
-  const unsigned char *byte = (const unsigned char *)data;
-
-  for (size_t k = 0; k < bytes; k++) hash = (hash ^ byte[k]) * 1099511628211ULL;
-  return hash;
-}
-
-/* Of all threads of the process. */
-PetscReal HycoCPU(void)
-{
-  struct timespec now;
-
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return (PetscReal)now.tv_sec + 1e-9 * (PetscReal)now.tv_nsec;
-}
-
-/* Seconds of a clock that nobody sets, hence for differences alone. */
-PetscReal HycoNow(void)
-{
-  struct timespec now;
-
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return (PetscReal)now.tv_sec + 1e-9 * (PetscReal)now.tv_nsec;
 }

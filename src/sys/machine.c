@@ -1,4 +1,4 @@
-/* The environment: a locale with a decimal point, memory of the machine, kernels, threads and memory of BLAS. */
+/* The environment: clocks, a locale with a decimal point, memory of the machine, kernels, threads and memory of BLAS. */
 #define _GNU_SOURCE /* MAP_ANONYMOUS, RTLD_DEFAULT */
 #include <hycobindings.h>
 #include <hycoimpl.h>
@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <time.h>
 #include <unistd.h>
 
 /* OpenBLAS allocates this much address space at its first call, and tries without end if it cannot. */
@@ -132,4 +133,22 @@ PetscErrorCode HycoReserveBLAS(void)
   LAPACKgetrf_(&two, &two, a, &two, pivot, &info);
   done = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of all threads of the process. */
+PetscReal HycoCPU(void)
+{
+  struct timespec now;
+
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return (PetscReal)now.tv_sec + 1e-9 * (PetscReal)now.tv_nsec;
+}
+
+/* Seconds of a clock that nobody sets, hence for differences alone. */
+PetscReal HycoNow(void)
+{
+  struct timespec now;
+
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (PetscReal)now.tv_sec + 1e-9 * (PetscReal)now.tv_nsec;
 }
