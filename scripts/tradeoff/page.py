@@ -10,6 +10,14 @@ def machine():
     return f"{names[0] if names else os.uname().machine}, {os.cpu_count()} cores"
 
 
+def machines(rows):
+    """On which machine each task was measured; rows of a task and its machine."""
+    found = {}
+    for task, where in rows:
+        found.setdefault(where, []).append(task)
+    return "One core of " + " and ".join(f"{where} ({'; '.join(dict.fromkeys(tasks))})" if len(found) > 1 else where for where, tasks in found.items())
+
+
 def write_section(path, name, lines):
     with open(path, encoding="utf-8") as file:
         text = file.read()

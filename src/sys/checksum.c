@@ -1,7 +1,7 @@
 /*
-  The checksum: the last 24 bytes of a file: "hyco-sum", the length and the checksum of the bytes before it, 8 bytes each,
-  little-endian. HDF5 1.10 checks the structure of a file but not its numbers: a flipped bit there would change a result
-  unnoticed.
+  The checksum: the last 24 bytes of a file: "hyco-sum", the length and the checksum of the bytes before it, 8 bytes
+  each, little-endian. HDF5 1.10 checks the structure of a file but not its numbers: a flipped bit there would change a
+  result unnoticed.
 */
 #include <hycoimpl.h>
 #include <stdio.h>

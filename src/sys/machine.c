@@ -1,4 +1,5 @@
-/* The environment: clocks, a locale with a decimal point, memory of the machine, kernels, threads and memory of BLAS. */
+/* The environment: clocks, a locale with a decimal point, memory of the machine, kernels, threads and memory of
+   BLAS. */
 #define _GNU_SOURCE /* MAP_ANONYMOUS, RTLD_DEFAULT */
 #include <hycobindings.h>
 #include <hycoimpl.h>

@@ -88,11 +88,11 @@ class Docs(unittest.TestCase):
         self.assertLessEqual(text('README.md').count('\n'), 90)
 
     def test_words(self):
-        """All documents together have at most 40,000 words, not counting what separates the cells of tables, nor pages made from the headers."""
+        """All documents together have at most 42,000 words, not counting what separates the cells of tables, nor pages made from the headers."""
         others = [os.path.join(SOURCE, name) for name in ('CHANGELOG.md', 'CONTRIBUTING.md', 'extensions/README.md', 'examples/ladder/README.md')]
         words = {path: sum(bool(re.search(r'\w', word)) for word in text(path).split()) for path in [*PAGES, *others]
                  if os.sep + 'api' + os.sep not in path}
-        self.assertLessEqual(sum(words.values()), 40000, words)
+        self.assertLessEqual(sum(words.values()), 42000, words)
 
     def test_api(self):
         """docs/api is what scripts/api-pages makes of the headers, and has every function that they declare with a comment."""
