@@ -69,10 +69,10 @@ def _points(mu, parameters):
         unknown = [] if hasattr(mu, 'columns') else [str(name) for name in mu.keys() if name not in parameters]  # a table may have other columns
         if unknown:
             raise WrongValue(f'the values name {", ".join(unknown)}; the parameters are {", ".join(parameters)}')
-        values = np.broadcast_arrays(*(np.asarray(mu[name], float) for name in parameters))
+        values = np.broadcast_arrays(*(c.numbers(mu[name]) for name in parameters))
         return np.ascontiguousarray(np.stack(values, -1)) if parameters else np.zeros(0)
-    mu = np.ascontiguousarray(mu, float)
-    if mu.ndim == 0 or mu.shape[-1] != len(parameters):
+    mu = np.atleast_1d(c.numbers(mu))
+    if mu.shape[-1] != len(parameters):
         raise WrongValue(f'parameter values of shape {mu.shape} were given; the last dimension must be {len(parameters)}, for '
                     f'{", ".join(parameters) or "no parameters"}')
     return mu
@@ -183,7 +183,9 @@ class _Owned:
 
     def close(self):
         """Frees the object. Closing twice is allowed."""
-        if c.running and self.handle:
+        if c.running and self.handle and self._collective:
+            c.free(self._destroy, self.handle)
+        elif c.running and self.handle:
             c.call(self._destroy, ctypes.byref(self.handle))
         self.handle = ctypes.c_void_p()
 
@@ -298,6 +300,7 @@ class Scene(_Handle):
     def __init__(self, path, **entries):
         super().__init__()
         self.path = str(path)
+        c.free_aside()
         _check_options(entries)
         try:
             for name, value in entries.items():
@@ -384,7 +387,7 @@ class Scene(_Handle):
                 raise interrupted[0] from None
             raise
         finally:
-            c.call('HycoReducerDestroy', ctypes.byref(reducer))
+            c.free('HycoReducerDestroy', reducer)
             for each in (samples, held):
                 c.call('HycoSamplesDestroy', ctypes.byref(each))
         model = Model(path)
@@ -402,7 +405,7 @@ class Scene(_Handle):
         c.call('HycoSamplesCreate', self._open, ctypes.byref(samples))
         try:
             if grid is not None:
-                counts = np.ascontiguousarray(grid, c.integer()[1]).ravel()
+                counts = c.numbers(grid, c.integer()[1]).ravel()
                 if len(counts) != len(self.parameters):
                     raise WrongValue(f'a grid of {len(counts)} numbers was given; {len(self.parameters)} are expected, for {", ".join(self.parameters)}')
                 c.call('HycoSamplesAddTrainingGrid', samples, c.address(counts))
@@ -700,13 +703,13 @@ class Model(_Handle):
         if lacking or not targets:
             raise WrongValue(f'the targets name {", ".join(lacking) or "no output"}; the outputs are {", ".join(self.outputs)}')
         output = np.array([known.index(name) for name in targets], c.integer()[1])
-        target = np.array(list(targets.values()), float)
+        target = c.numbers(list(targets.values()))
         mu, found = np.zeros(len(self.parameters)), np.zeros(1, c.struct('HycoFit'))
         start = None if start is None else _one(start, self.parameters)
         lacking = [name for name in hold or {} if name not in self.parameters]
         if lacking:
             raise WrongValue(f'hold names {", ".join(lacking)}; the parameters are {", ".join(self.parameters)}')
-        held = np.array([(hold or {}).get(name, np.nan) for name in self.parameters], float)
+        held = c.numbers([(hold or {}).get(name, np.nan) for name in self.parameters])
         c.call('HycoROMFit', handle, c.count(len(output)), c.address(output), c.address(target), c.address(start), c.address(held), c.count(samples),
                c.count(starts), kind.encode(), c.address(mu), c.address(found))
         fit = Fit(mu, self.predict(mu, check=False).outputs, self.parameters, found[0])

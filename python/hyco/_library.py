@@ -2,6 +2,7 @@
 import atexit
 import ctypes
 import functools
+import operator
 import os
 import signal
 import sys
@@ -185,6 +186,24 @@ def layout(name):
     return size.value, members
 
 
+aside = []  # destroy functions and handles
+
+
+def free(destroy, handle):
+    """Destroys an object of all processes. While an exception passes, which the others may not have, it is set aside instead: all meet again
+    at the next Scene, or the exception ends them."""
+    if World.size > 1 and sys.exc_info()[0]:
+        aside.append((destroy, type(handle)(handle.value)))
+    elif running:
+        call(destroy, ctypes.byref(handle))
+
+
+def free_aside():
+    """Destroys what was set aside, in its order."""
+    while aside:
+        call(aside[0][0], ctypes.byref(aside.pop(0)[1]))
+
+
 types = {}
 
 
@@ -207,7 +226,22 @@ def integer():
 
 def count(n=0):
     """A PetscInt of C."""
-    return integer()[0](n)
+    try:
+        return integer()[0](operator.index(n))
+    except TypeError:
+        raise WrongValue(f'{n!r} was given; a whole number is expected') from None
+
+
+def numbers(values, kind=float):
+    """Values as an array of real numbers; of whole ones for a kind of integers."""
+    try:
+        given = np.asarray(values)
+        given = given.astype(float) if given.dtype == object else given
+        if given.dtype.kind not in 'biuf' or (np.dtype(kind).kind == 'i' and not np.array_equal(given, np.round(np.nan_to_num(given)))):
+            raise ValueError
+    except (TypeError, ValueError):
+        raise WrongValue(f'{values!r:.80} was given; {"whole" if np.dtype(kind).kind == "i" else "real"} numbers are expected') from None
+    return np.array(given, kind, order='C')
 
 
 def address(array):

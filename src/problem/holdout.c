@@ -88,7 +88,7 @@ PetscErrorCode HycoSamplesAddScattered(HycoSamples samples, PetscInt count)
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, NULL, &n_par, NULL));
   PetscCall(HycoSamplesGetScene(samples, &s));
-  HycoCheck(count >= 1 && count <= 100000000, "%d scattered points; 1 to 100 million are expected", (int)count);
+  HycoCheckValue(count >= 1 && count <= 100000000, "%d scattered points; 1 to 100 million are expected", (int)count);
   FindAxes(n_par, s->lo, s->hi, NULL, &axes);
   for (PetscInt k = 0; k < count; k++) {
     const Place place = (Place)(k % N_PLACES);

@@ -428,14 +428,15 @@ static PetscErrorCode SetRanges(Fit *f, const PetscReal held[], PetscInt *n_free
   if (!held) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt p = 0; p < f->n_par; p++) {
     if (PetscIsNanReal(held[p])) continue;
-    HycoCheck(held[p] >= scene->lo[p] && held[p] <= scene->hi[p],
-              "a fit holds the parameter %s at %.10g; its range is from %.10g to %.10g", scene->parameter[p],
-              (double)held[p], (double)scene->lo[p], (double)scene->hi[p]);
+    HycoCheckValue(held[p] >= scene->lo[p] && held[p] <= scene->hi[p],
+                   "a fit holds the parameter %s at %.10g; its range is from %.10g to %.10g", scene->parameter[p],
+                   (double)held[p], (double)scene->lo[p], (double)scene->hi[p]);
     f->lo[p] = f->hi[p] = held[p];
     --*n_free;
   }
-  HycoCheck(*n_free, "a fit holds all %d parameters, so that nothing is left to find; predict gives the outputs there",
-            (int)f->n_par);
+  HycoCheckValue(*n_free,
+                 "a fit holds all %d parameters, so that nothing is left to find; predict gives the outputs there",
+                 (int)f->n_par);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -488,16 +489,16 @@ PetscErrorCode HycoROMFit(HycoROM m, PetscInt n, const PetscInt output[], const 
   HycoCheckGiven(type);
   scene = m->model->scene;
   f.n_par = scene->n_parameters;
-  HycoCheck(n > 0 && n <= HYCO_MAX_QUANTITIES && n_samples > 0 && n_starts > 0,
-            "a fit has %d targets, %d samples and %d starts; at least 1 of each is expected", (int)n, (int)n_samples,
-            (int)n_starts);
-  HycoCheck(!strcmp(type, HYCO_FIT_BRGN) || !strcmp(type, HYCO_FIT_BLMVM),
-            "the type of a fit is \"%s\"; it must be " HYCO_FIT_BRGN " or " HYCO_FIT_BLMVM, type);
+  HycoCheckValue(n > 0 && n <= HYCO_MAX_QUANTITIES && n_samples > 0 && n_starts > 0,
+                 "a fit has %d targets, %d samples and %d starts; at least 1 of each is expected", (int)n,
+                 (int)n_samples, (int)n_starts);
+  HycoCheckValue(!strcmp(type, HYCO_FIT_BRGN) || !strcmp(type, HYCO_FIT_BLMVM),
+                 "the type of a fit is \"%s\"; it must be " HYCO_FIT_BRGN " or " HYCO_FIT_BLMVM, type);
   for (PetscInt k = 0; k < n; k++) {
-    HycoCheck(output[k] >= 0 && output[k] < (scene->n_times ? 2 : 1) * scene->n_quantities,
-              "there is no output %d; the model has %d", (int)output[k], (int)scene->n_quantities);
-    HycoCheck(!PetscIsInfOrNanReal(target[k]), "the target of %s is %g; a finite number is expected",
-              scene->quantity[output[k] % scene->n_quantities].name, (double)target[k]);
+    HycoCheckValue(output[k] >= 0 && output[k] < (scene->n_times ? 2 : 1) * scene->n_quantities,
+                   "there is no output %d; the model has %d", (int)output[k], (int)scene->n_quantities);
+    HycoCheckValue(!PetscIsInfOrNanReal(target[k]), "the target of %s is %g; a finite number is expected",
+                   scene->quantity[output[k] % scene->n_quantities].name, (double)target[k]);
   }
   PetscCall(SetRanges(&f, held, &n_free));
   *fit = (HycoFit){.n_starts = n_starts, .n_free = n_free};

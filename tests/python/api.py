@@ -57,10 +57,16 @@ try:
 except ValueError as error:
     sys.stdout.write('own points[1]\n' if 'points[1]' in str(error) else str(error))
 sys.stdout.flush()
-if sys.argv[3:] and hyco.rank() == 0:
-    raise RuntimeError('one process alone')
-if sys.argv[3:]:
-    scene = hyco.Scene(sys.argv[1])  # waits for the other
+for n in range(2 if sys.argv[3:] else 0):
+    try:
+        with hyco.Scene(sys.argv[1]) as scene:
+            scene.solve([0.03, 900])
+            if hyco.rank() == 0 or not n:
+                raise RuntimeError('one process alone' if n else 'all')
+            scene.solve([0.03, 900])  # waits for the other
+    except RuntimeError as error:
+        if 'alone' in str(error):
+            raise
 """
 
 
@@ -207,9 +213,11 @@ class Python(Case):
             self.assertEqual(again.starts, 1)
             self.assertLess(again.misfit, 1e-5)
             for bad in (lambda: model.fit({'nothing': 1}), lambda: model.fit({}), lambda: model.fit({'lift': float('nan')}), lambda: model.fit(targets, kind='newton'),
-                        lambda: model.fit(targets, hold={'none': 1}), lambda: model.fit(targets, hold={names[0]: 1e9})):
+                        lambda: model.fit(targets, hold={'none': 1}), lambda: model.fit(targets, hold={names[0]: 1e9}), lambda: model.fit(targets, starts=0),
+                        lambda: model.fit(targets, samples=1.5), lambda: model.fit({'lift': 'heavy'}), lambda: model.fit({'lift': 1j}), lambda: model.fit(targets, start='abc')):
                 with self.assertRaises(self.hyco_py.Error) as error:
                     bad()
+                self.assertIsInstance(error.exception, ValueError)
                 self.assertEqual(len(str(error.exception).splitlines()), 1)
 
     def test_paths(self):
@@ -293,7 +301,10 @@ class Python(Case):
             for do, kind, words in ((lambda: model.predict([7, 0.17]), ValueError, ['mu1']),
                                     (lambda: model.predict([[0.07, 0.17], [0.1, 0.2], [7, 0.17]]), ValueError, ['points[2]', 'mu1']),
                                     (lambda: model.gradient([[0.07, 0.17], [7, 0.17]]), ValueError, ['points[1]']),
-                                    (lambda: model.predict([0.1]), ValueError, ['mu1']), (lambda: scene.solve({'press': 1}), ValueError, ['modulus']),
+                                    (lambda: model.predict([0.1]), ValueError, ['mu1']), (lambda: model.predict('abc'), ValueError, ['abc']),
+                                    (lambda: model.predict([0.07, 0.17 + 1j]), ValueError, ['real']), (lambda: model.predict({'mu1': 'abc', 'mu2': 1}), ValueError, ['abc']),
+                                    (lambda: model.predict([[0.1], [0.1, 0.2]]), ValueError, ['0.2']),
+                                    (lambda: scene.train('x.h5', grid=[2.5, 3]), ValueError, ['whole']), (lambda: scene.train('x.h5', scatter=0), ValueError, ['0']), (lambda: scene.solve({'press': 1}), ValueError, ['modulus']),
                                     (lambda: scene.train('x.h5', points=[[0.03, 900], [0.03, 9]]), ValueError, ['points[1]', 'modulus']),
                                     (lambda: scene.train('x.h5', grid=[3, 3], validation=[[0.03, 9]]), ValueError, ['validation[0]', 'modulus']),
                                     (lambda: hyco.Scene('block.yaml', hyco_pod_tool=1), ValueError, ['hyco_pod_tol']),
@@ -596,7 +607,7 @@ print(lib.openblas_get_corename().decode())"""
 
     def test_ranks(self):
         """Under mpiexec every process has the answers of one; errors are on all; points of a process's own are its own, with their errors; an exception
-        that nothing catches on one ends all."""
+        that nothing catches on one ends all, in a with block too, and one that all catch lets them go on."""
         sums = {}
         for n in (0, 1, 2, 3):
             run = self.ranks(n, model=f'ranks{n}.h5')
