@@ -22,11 +22,12 @@ typedef const char *HycoMaterialType;
 
 /* Value of `initial` for a constant that the scene must give. */
 #define HYCO_REQUIRED PETSC_INFINITY
-/* Lower bound of a constant that may be 0, but not negative. */
+/* Bound of a constant that may be 0, but not negative: any number below 0, as bounds are excluded. */
 #define HYCO_NOT_NEGATIVE (-1e-300)
-/* Bounds that include 1 in the interval. */
+/* Bound of an interval that begins with 1 included: the number before 1, as bounds are excluded. */
 #define HYCO_FROM_ONE (1 - PETSC_MACHINE_EPSILON)
-#define HYCO_TO_ONE   (1 + PETSC_MACHINE_EPSILON)
+/* Bound of an interval that ends with 1 included: the number after 1, as bounds are excluded. */
+#define HYCO_TO_ONE (1 + PETSC_MACHINE_EPSILON)
 
 /*
   n integration points of one law. Strain and stress have n_strain components per point: 1D (xx), 2D (xx, yy, zz, xy),

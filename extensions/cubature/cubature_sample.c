@@ -8,7 +8,9 @@
 */
 #include "cubature.h"
 
-#define SHARE 1e-2 /* share of the energy tolerance for the truncation of the vectors */
+/* Of the tolerance of the energies: a hundredth, so that the truncation of the vectors does not decide which cells the
+   weights need. */
+#define TRUNCATION_SHARE 1e-2
 
 typedef struct {
   HycoReducer t;
@@ -248,10 +250,10 @@ PetscErrorCode HycoCubatureSample(HycoReducer t, HycoSnapshots store, PetscReal 
 
   PetscFunctionBegin;
   PetscCall(CubatureSampleCreate(t, &s));
-  ierr = CubatureSampleJoin(&s, store, SHARE * tol, &J);
+  ierr = CubatureSampleJoin(&s, store, TRUNCATION_SHARE * tol, &J);
   PetscCall(HycoTrainingReplayDestroy(&s.replay));
   HycoFreeAll(&s.V, &s.g, &s.rows);
-  if (!ierr) ierr = CubatureSampleDecompose(t, J, SHARE * tol, W, n, sigma);
+  if (!ierr) ierr = CubatureSampleDecompose(t, J, TRUNCATION_SHARE * tol, W, n, sigma);
   PetscCall(MatDestroy(&J));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

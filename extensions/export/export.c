@@ -23,25 +23,37 @@
 #include "runtime/paths.c"
 #include "runtime/flow.c"
 
-#define EXACT          2e-11 /* error of a function at points that were not fitted */
-#define CHECKED        64    /* points at which the runtime is compared with the model */
-#define AGREES         1e-9  /* difference there, of an output's largest value; of bodies that flow: */
-#define FLOWS_AGREE    1e-8
-#define NEWTON_RTOL    1e-12 /* of both, as what Newton's method leaves adds up over the steps of a path */
-#define PLACES         6     /* at which expressions in space are functions of the parameters */
-#define MOST           6000000
-#define MOST_ITEMS     3000
-#define PATHS_CHECKED  8 /* or so many paths */
+/* Of the largest value of a fitted function, at points that were not fitted: 1/50 of OUTPUTS_AGREE, since a program
+   sums up to fifty functions. */
+#define FIT_TOLERANCE 2e-11
+#define CHECKED       64 /* points at which the runtime is compared with the model */
+/* Of an output's largest value, program against model: the sum of FIT_TOLERANCE over some fifty functions
+   (tests/models/export.py). */
+#define OUTPUTS_AGREE 1e-9
+/* Of an output's largest value, program against model, of bodies that flow: ten times OUTPUTS_AGREE, because a path
+   adds up what Newton's method leaves in its steps. */
+#define FLOWS_AGREE 1e-8
+/* Of the forces of a step, in program and model: what Newton's method leaves adds up over 1000 steps to a tenth of
+   FLOWS_AGREE. */
+#define NEWTON_RTOL   1e-12
+#define PLACES        6 /* at which expressions in space are functions of the parameters */
+#define MOST          6000000
+#define MOST_ITEMS    3000
+#define PATHS_CHECKED 8 /* or so many paths */
+/* Of the forces, a program's residual along a path: the default of -hyco_solver_rtol. */
 #define PATH_TOLERANCE 1e-8
-#define HELD_ROW       1e-12 /* of what a force at a tangent moves, beside its block */
-#define ROUNDING       1e-12 /* of a coefficient beside others */
-#define SAMPLES        120   /* points for the functions, of which a third checks them; more with weights of samples: */
-#define SEVERAL        20    /* samples: with more, products are tried of known functions alone */
-#define EACH           8     /* for each */
-#define NEARLY                                                                                                         \
-  1e-3         /* an error that more functions may remove; they are chosen from all at once at as many
-                               points: */
-#define MORE 3 /* times */
+/* Of what the same force moves in its block: the round-off of a solve with a factor; such a tangent is held. */
+#define HELD_ROW 1e-12
+/* Of the largest coefficient of a load: the round-off of a sum of thousands of terms. */
+#define COEFFICIENT_ROUND_OFF 1e-12
+/* Points for the functions, of which a third checks them; EACH more for each sample whose weight is a function. */
+#define SAMPLES 120
+#define SEVERAL 20 /* samples: with more, products are tried of known functions alone */
+#define EACH    8
+/* Of the largest value of a function: below it the fit is repeated with functions chosen from all at once at more
+   points; larger errors have another cause (tests/models/export.py). */
+#define REPAIRABLE 1e-3
+#define MORE       3 /* times as many points then */
 
 /* A value: of an output, of a contact's force along an axis, of a stress in a cell, of a displacement, of a travel. */
 typedef struct {
@@ -667,8 +679,8 @@ static PetscErrorCode FitRows(Export *e, PetscInt last, const HycoFitData *data,
   if (e->n_weights > SEVERAL) last = PetscMin(last, 1);
   if (e->travel && fit == &e->base) PetscCall(FindSeeds(e, data->row[0], from, &n_seeds, seed));
   for (PetscInt together = 0; together < 2; together++) {
-    for (PetscInt level = n_seeds ? -1 - e->atoms.n : 0; level <= last && part.worst > EXACT; level++) {
-      PetscCall(HycoFitFunctions(&e->atoms, level, (PetscBool)together, n_seeds, seed, EXACT, data, &trial));
+    for (PetscInt level = n_seeds ? -1 - e->atoms.n : 0; level <= last && part.worst > FIT_TOLERANCE; level++) {
+      PetscCall(HycoFitFunctions(&e->atoms, level, (PetscBool)together, n_seeds, seed, FIT_TOLERANCE, data, &trial));
       if (trial.worst > part.worst) continue;
       kept = part;
       part = trial;
@@ -695,7 +707,7 @@ static PetscErrorCode ExportFit(Export *e, PetscInt last, HycoFitData data, Hyco
   PetscCall(HycoExportFitFree(fit));
   PetscCall(PetscMalloc1(data.stride + 1, &row));
   data.row = row;
-  for (PetscInt g = 0; g < (e->travel ? e->n_groups : 1) && fit->worst <= EXACT; g++) {
+  for (PetscInt g = 0; g < (e->travel ? e->n_groups : 1) && fit->worst <= FIT_TOLERANCE; g++) {
     data.n_rows = 0;
     for (PetscInt r = 0; r < data.stride; r++) {
       if (!e->travel || data.group[r] == g) row[data.n_rows++] = r;
@@ -722,7 +734,7 @@ static PetscErrorCode FitBoth(Export *e, PetscInt fixed, PetscInt times)
                       (HycoFitData){o.n, e->atoms.n, 2 * e->ny, 0, value, o.added, NULL, e->group, scale},
                       &e->response));
   /* If the response has no functions the export is refused anyway: the costly levels are left out. */
-  PetscCall(ExportFit(e, e->response.worst > EXACT ? 0 : HYCO_FIT_LEVELS - 1,
+  PetscCall(ExportFit(e, e->response.worst > FIT_TOLERANCE ? 0 : HYCO_FIT_LEVELS - 1,
                       (HycoFitData){o.n, e->atoms.n, e->ny, 0, value, o.y, NULL, e->group, scale}, &e->base));
   HycoFreeAll(&o.y, &o.added, &o.mu, &scale, &value);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -731,7 +743,7 @@ static PetscErrorCode FitBoth(Export *e, PetscInt fixed, PetscInt times)
 /* The line of a refusal: what has no such functions, and the parameters without which it would. */
 static PetscErrorCode ExportRefuse(Export *e)
 {
-  const PetscBool response = (PetscBool)(e->response.worst > EXACT);
+  const PetscBool response = (PetscBool)(e->response.worst > FIT_TOLERANCE);
   const PetscInt row = (response ? e->response.worst_row : e->base.worst_row) % e->ny, at = row - e->p - e->k;
   char of[HYCO_LINE], list[HYCO_LINE] = "";
 
@@ -748,7 +760,8 @@ static PetscErrorCode ExportRefuse(Export *e)
   for (PetscInt p = 0; p < e->s->n_parameters && !e->travel; p++) { /* there it takes long */
     /* With parameter p fixed: if the fits are exact then, p is what has no such functions. */
     PetscCall(FitBoth(e, p, 1));
-    if (e->base.worst <= EXACT && e->response.worst <= EXACT) PetscCall(HycoListAdd(list, " and ", e->s->parameter[p]));
+    if (e->base.worst <= FIT_TOLERANCE && e->response.worst <= FIT_TOLERANCE)
+      PetscCall(HycoListAdd(list, " and ", e->s->parameter[p]));
   }
   if (response && at < 0)
     HycoFail(
@@ -929,7 +942,7 @@ static PetscErrorCode DropRounding(Export *e)
       PetscReal *of = &most[e->group[i % e->ny]];
 
       if (!pass) *of = PetscMax(*of, size);
-      if (pass && size <= ROUNDING * *of) e->base.coefficient[i] = 0;
+      if (pass && size <= COEFFICIENT_ROUND_OFF * *of) e->base.coefficient[i] = 0;
     }
   }
   PetscCall(PetscFree(most));
@@ -1159,7 +1172,7 @@ static PetscErrorCode ExportCompare(Export *e, const Model *model, void *memory)
   for (PetscInt k = 0; k < n; k++) {
     const PetscReal scale = ScaleOf(e, most, k);
 
-    HycoCheck(worst[k] <= (e->flows ? FLOWS_AGREE : AGREES) * scale,
+    HycoCheck(worst[k] <= (e->flows ? FLOWS_AGREE : OUTPUTS_AGREE) * scale,
               "export: the output %s of the program differs from the model's by %.1e of the largest value; the forces "
               "may not be unique%s",
               e->out.name[k], (double)(worst[k] / scale),
@@ -1292,9 +1305,10 @@ static PetscErrorCode ExportBuild(Export *e)
   PetscCall(ExportPrepare(e));
   PetscCall(FitBoth(e, -1, 1));
   /* A choice one by one misses functions that are nearly sums of others, as a small angle beside its sine. */
-  if (PetscMax(e->base.worst, e->response.worst) > EXACT && PetscMax(e->base.worst, e->response.worst) < NEARLY)
+  if (PetscMax(e->base.worst, e->response.worst) > FIT_TOLERANCE &&
+      PetscMax(e->base.worst, e->response.worst) < REPAIRABLE)
     PetscCall(FitBoth(e, -1, MORE));
-  if (e->base.worst > EXACT || e->response.worst > EXACT) PetscCall(ExportRefuse(e));
+  if (e->base.worst > FIT_TOLERANCE || e->response.worst > FIT_TOLERANCE) PetscCall(ExportRefuse(e));
   PetscCall(ExportFill(e));
   e->out.n_states = (PetscInt)state_size(&e->out.m);
   PetscCall(PetscMalloc1(e->out.n_states, &e->state));

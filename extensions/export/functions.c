@@ -6,13 +6,16 @@
 #include <math.h>
 #include <string.h>
 
-#define INDEPENDENT 1e-5 /* of a function beside the former ones, relative to its own size */
-#define MIXED       12   /* combinations of the rows by which functions are chosen */
-#define MOST        40   /* functions */
-#define MANY        3000 /* candidates: more take too long */
-#define SAME        1e-13
+/* Of a function's own norm, what former functions leave of it: the coefficients of a sum then lose at most 5 of 16
+   digits, and FIT_TOLERANCE stays attainable. */
+#define INDEPENDENT 1e-5
+#define MIXED       12    /* combinations of the rows by which functions are chosen */
+#define MOST        40    /* functions */
+#define MANY        3000  /* candidates: more take too long */
+#define SAME_VALUE  1e-13 /* of a function's value: 450 eps, two orders of evaluating one expression */
 #define PASSES      3     /* of a solution by a pseudo-inverse */
-#define DEPENDENT   1e-10 /* share of an expression that is left beside a sum of others: round-off */
+/* Of the square of an expression's norm, left by a sum of others: the square of INDEPENDENT. */
+#define DEPENDENT 1e-10
 
 static PetscReal FitProduct(PetscInt n, const PetscReal a[], const PetscReal b[])
 {
@@ -68,7 +71,7 @@ static PetscErrorCode FitAgreesWithParser(HycoScene s, const char key[], const c
     if (*agrees && !ierr && axis >= 0) ierr = HycoExprEval(e, mu, 1, x, &first);
     if (*agrees && !ierr)
       *agrees = (PetscBool)(PetscAbsReal(mine - (theirs - first)) <=
-                            SAME * PetscMax(PetscAbsReal(theirs), PetscAbsReal(first)));
+                            SAME_VALUE * PetscMax(PetscAbsReal(theirs), PetscAbsReal(first)));
   }
   PetscCall(HycoExprDestroy(&e));
   PetscCall(ierr);

@@ -15,12 +15,14 @@
 #include <string.h>
 #include <unistd.h>
 
-#define API_VERSION    1
-#define NO_TEMPERATURE 293.15 /* for a body without a temperature; for laws that do not depend on it */
-#define MESSAGE        512    /* size required by the interface */
-#define CONSISTENT     4.     /* in K[0]: integrate, and return the consistent tangent */
-#define ELASTIC        -1.    /* in K[0]: return only the elastic tangent */
-#define MAX_INTERNAL   64
+#define API_VERSION 1
+/* Temperature in K given to laws that do not depend on it, for a body without one: a room's. */
+#define NO_TEMPERATURE 293.15
+#define MESSAGE        512 /* size required by the interface */
+/* Value of K[0]: integrate, and return the consistent tangent (MFront's generic interface). */
+#define CONSISTENT   4.
+#define ELASTIC      -1. /* value of K[0]: return only the elastic tangent (MFront's generic interface) */
+#define MAX_INTERNAL 64
 
 /* The interface's structs: pointers to the state at the begin of a step, to that at its end, and both with the
    request. */

@@ -147,7 +147,9 @@ static void RegressionColumn(HycoROM m, const PetscReal mu[], PetscReal column[]
     column[n + 1 + p] = (mu[p] - s->lo[p]) / (s->hi[p] > s->lo[p] ? s->hi[p] - s->lo[p] : 1);
 }
 
-#define SINGULAR 1e-13 /* points on one plane do not determine the polynomial: its least norm is taken */
+/* Of the largest singular value of the polynomials at the points: 450 eps; points on one plane do not determine the
+   polynomial, and its least norm is taken. */
+#define SINGULAR 1e-13
 
 /* The inverse of the system, with the polynomial's columns beside and below the kernels'. */
 static PetscErrorCode RegressionInvert(HycoROM m)
@@ -231,7 +233,7 @@ static void RegressionSum(HycoROM m, PetscInt step, PetscInt rows, const PetscRe
   for (PetscInt i = 0; i < rows; i++) value[i] = PetscMax(value[i], least);
 }
 
-#define NO_FORCE 1e-12 /* share of the largest in training: round-off */
+#define NO_FORCE 1e-12 /* of the largest force in training: 4500 eps, a sum over the training points */
 
 /* Displacement and forces at mu (all variables), with a history at listed time `step`. */
 static PetscErrorCode RegressionEvaluate(HycoROM m, PetscInt step, const PetscReal mu[])

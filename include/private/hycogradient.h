@@ -7,9 +7,6 @@
 #include <hycofomimpl.h>
 #include <hycosceneimpl.h>
 
-/* Contacts with more than this share of the largest force count as closed where their masters are compared. */
-#define HYCO_GRADIENT_FORCE 1e-7
-
 /* Why there is no derivative where no contact force keeps a body. */
 #define HYCO_GRADIENT_LOOSE                                                                                            \
   "no contact force keeps %s: its position is arbitrary here, and has no derivative; support it, or take a point at "  \
@@ -25,10 +22,12 @@ typedef struct _n_HycoDifference {
   int sign; /* the direction of one-sided derivatives: 1; at the upper end of the range -1 */
 } HycoDifference;
 
-/* Steps as shares of the range: of data, where the error of the central difference is about 1e-9 and that of round-off
-   less; of paths, whose round-off is that of Newton's method. */
-#define HYCO_GRADIENT_STEP      3e-5
-#define HYCO_GRADIENT_CLOSER    2 /* differences of a quarter of the step, where slopes jump */
+/* Step as a share of a parameter's range, of differences of data: the error of a central difference is then about 1e-9
+   (its square), that of round-off 1e-11. */
+#define HYCO_GRADIENT_STEP   3e-5
+#define HYCO_GRADIENT_CLOSER 2 /* differences of a quarter of the step, where slopes jump */
+/* Step as a share of a parameter's range, of differences of paths: their round-off is that of Newton's method
+   (HYCO_GRADIENT_RTOL), 1e-8 of a slope, as is the square of the step. */
 #define HYCO_GRADIENT_PATH_STEP 1e-4
 /* Central where the range has room for it, else of the same order to the inside. share: the step's, of the range. */
 void HycoDifferenceSet(HycoScene scene, const PetscReal mu[], PetscInt parameter, PetscReal share,
@@ -64,7 +63,8 @@ PetscErrorCode HycoGradientColumn(HycoGradient *gradient, HycoGradientStore *sto
 
 /* most[n_quantities]: the largest of each output at the listed times, without its sign. */
 void HycoPathLargest(HycoScene scene, const HycoStep step[], PetscReal most[]);
-/* Tolerance of Newton's method on the paths beside a solution. */
+/* Of the forces of a step, Newton's method on the perturbed paths: 4500 eps, the least that it reaches on thousands of
+   unknowns. */
 #define HYCO_GRADIENT_RTOL 1e-12
 /* Solves the path at mu in the steps of the solution, as far as its end, without monitors and files; *step: at its
    n_times listed times, with the outputs. Borrowed until the next call. */

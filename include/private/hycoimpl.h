@@ -3,6 +3,7 @@
 #define HYCOIMPL_H
 
 #include <hycoprogram.h>
+#include <hycotolerance.h>
 #include <petsc/private/petscimpl.h>
 #include <petscmat.h>
 #include <stdio.h>
@@ -189,8 +190,6 @@ void HycoPointEnd(void *before);
 PetscErrorCode HycoReserveBLAS(void);
 /* Of this machine, in bytes; 0: not known. */
 PetscReal HycoMachineMemory(void);
-
-#define HYCO_NOTHING (16 * PETSC_MACHINE_EPSILON) /* share of its terms up to which a difference may be round-off */
 
 /* lost / size; 0/0 counts as 0, x/0 is PETSC_INFINITY. */
 static inline PetscReal HycoRelative(PetscReal lost, PetscReal size)

@@ -45,7 +45,6 @@ unsigned long long HycoSetHash(PetscInt n, const PetscBool active[]);
 
 /* -- dense complementarity, w = q + M z >= 0, z >= 0, w.z = 0; all replicated -- */
 
-#define HYCO_DEPENDENT 1e-12 /* share of a diagonal entry: a pivot that is no larger is round-off */
 /*
   Factors the triangle ("L" or "U", by columns) of the symmetric n x n matrix A; *regular: no pivot is round-off beside
   its diagonal entry, or beside scale[n].

@@ -393,6 +393,7 @@ PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], PetscR
 /* Sets numbers[] of the current model: condition and mean training errors; or only the errors, where a prediction
    that did not converge or is meaningless counts as HYCO_JUDGED_WORST. `most`: a mean error of u above it is of no
    interest, and both are then HYCO_JUDGED_WORST. Rank 0. */
+/* Error of a model that gives no prediction: above the error 1 of the prediction 0. */
 #define HYCO_JUDGED_WORST  10.0
 #define HYCO_UNSOLVED_WORK 30 /* a prediction without a solution tries all methods: so many times the operations */
 PetscErrorCode HycoReducerJudge(HycoReducer t, HycoROM model);

@@ -20,12 +20,12 @@ typedef struct _n_HycoBalance *HycoBalance;
 #define HYCO_ESTIMATE_FEATURES 5
 #define HYCO_ESTIMATE_DISTANCE 3 /* index of the distance among the features */
 #define HYCO_FEATURES          9 /* the same and further ones, by which regimes unlike the held-out ones are noticed */
-/* A contact force below this share of the largest of a set is replaced by that share where errors are divided by it. */
+/* Of the largest force of a set: the size by which errors of smaller forces are divided; a tenth, since a nearly
+   unloaded point would otherwise decide the largest relative error. */
 #define HYCO_SMALL_FORCE 0.1
-/* A predicted contact force up to this share of the largest is round-off. */
-#define HYCO_PRESSES 1e-10
 typedef enum { HYCO_ESTIMATE_U, HYCO_ESTIMATE_SIGMA, HYCO_ESTIMATE_LAMBDA, HYCO_N_ESTIMATES } HycoEstimateKind;
-/* Share of the largest absolute value of a quantity: errors up to it are round-off. */
+/* Of the largest absolute value of an output: the residual of a solve, 1e-8 at most and 1e-10 as a rule; smaller errors
+   are not told from round-off. */
 #define HYCO_OUTPUT_ROUND_OFF 1e-10
 /* Error of a quantity of the scene, in its unit, for a path the largest of its listed times. */
 typedef struct {

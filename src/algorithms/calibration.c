@@ -3,12 +3,18 @@
 #include <hycoalgorithms.h>
 #include <petscsys.h>
 
-#define RIDGE      1e-1 /* relative to the square sum of a column: correlated features share the weight */
-#define CONSTANT   1e-2 /* a column that varies less says nothing: its differences may be round-off */
-#define CONFIDENCE 0.75 /* of the tolerance limit, */
-#define MANY_ABOVE 1    /* which counts if fewer values than this are expected above the quantile */
-#define LEVERAGE   1.4  /* in logarithms: a factor of 4 */
-#define FAR        1.4  /* no value lies above the limit by more: logarithms, a factor of 4 */
+/* Of the square sum of a column: correlated features share the weight, and 20 points determine five of them;
+   calibration on the drawn scenes (tests/models/estimates.py). */
+#define RIDGE 1e-1
+/* Spread of a column of logarithms, below which it is left out: a feature that varies by 1 % explains no error of other
+   size. */
+#define CONSTANT_FEATURE 1e-2
+/* Probability that the tolerance limit holds: three of four trainings, as more makes the bounds of 6 points useless
+   (tests/unit, calibration of the drawn scenes). */
+#define CONFIDENCE       0.75
+#define MANY_ABOVE       1   /* which counts if fewer values than this are expected above the quantile */
+#define MOST_LEVERAGE    1.4 /* logarithm by which leaving a point out may raise its own excess: a factor of 4 */
+#define MOST_ABOVE_LIMIT 1.4 /* logarithm by which a held-out error may lie above the limit: a factor of 4 */
 
 /* c >= 0 that minimises |X c - y|^2 about the means, regularised. The ridge is added as p rows; the means are
    removed, since the constant is fitted separately. Exponents must not be negative: an estimate never falls as a
@@ -30,7 +36,8 @@ static PetscErrorCode CalibrationFit(PetscInt n, PetscInt p, const PetscReal X[]
       A[j * rows + i] = X[i * p + j] - at;
       square += A[j * rows + i] * A[j * rows + i];
     }
-    if (n > 0 && square < CONSTANT * CONSTANT * n) PetscCall(PetscArrayzero(A + j * rows, n)); /* gcc 14: n < 0 */
+    if (n > 0 && square < CONSTANT_FEATURE * CONSTANT_FEATURE * n)
+      PetscCall(PetscArrayzero(A + j * rows, n)); /* gcc 14: n < 0 */
     A[j * rows + n + j] = PetscSqrtReal(RIDGE * square);
   }
   PetscCall(HycoNNLS(rows, p, A, b, c, &residual));
@@ -68,7 +75,7 @@ static PetscErrorCode CalibrationLimit(PetscInt n, PetscInt independent, PetscRe
   PetscCall(PetscSortReal(n, value));
   /* The (n + 1)-rule: of later values of the same distribution this share lies below on average. */
   *limit = value[PetscMin((PetscInt)PetscCeilReal(share * (PetscReal)(n + 1) * (1 - 1e-12)), n) - 1];
-  *limit = PetscMax(*limit, value[n - 1] - FAR);
+  *limit = PetscMax(*limit, value[n - 1] - MOST_ABOVE_LIMIT);
   if (n < 2 || (PetscReal)independent * (1 - share) >= MANY_ABOVE) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt i = 0; i < n; i++) mean += value[i] / n;
   for (PetscInt i = 0; i < n; i++) square += PetscSqr(value[i] - mean) / (n - 1);
@@ -115,7 +122,7 @@ PetscErrorCode HycoRaiseBound(PetscInt n, const PetscInt group[], PetscInt p, co
 
 /* above[]: by row, y minus the formula; on return y minus the formula that is fitted without the rows of its group,
    because a formula follows the rows to which it was fitted more closely than others. A row far from all others alone
-   determines the formula there: its difference is raised by LEVERAGE at most. */
+   determines the formula there: its difference is raised by MOST_LEVERAGE at most. */
 static PetscErrorCode LeaveOut(PetscInt n, PetscInt explanatory, const PetscInt group[], PetscInt p,
                                const PetscReal X[], const PetscReal y[], PetscReal above[])
 {
@@ -133,7 +140,7 @@ static PetscErrorCode LeaveOut(PetscInt n, PetscInt explanatory, const PetscInt 
     }
     PetscCall(PetscArrayzero(c, p));
     if (kept) PetscCall(CalibrationFit(kept, p, rest, z, c));
-    above[i] = PetscMin(CalibrationExcess(p, X + i * p, y[i], c), above[i] + LEVERAGE);
+    above[i] = PetscMin(CalibrationExcess(p, X + i * p, y[i], c), above[i] + MOST_LEVERAGE);
   }
   PetscCall(PetscFree3(rest, z, c));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -23,8 +23,8 @@ struct _n_HycoInterpolant {
   PetscReal *inverse;
 };
 
-/* A scaled simplex with a smaller volume is degenerate. */
-#define FLAT 1e-12
+/* Of the unit cube, the volume of a simplex in scaled parameters: 4500 eps, a determinant of numbers up to 1. */
+#define FLAT_SIMPLEX 1e-12
 
 /* Duplicates would make the triangulation degenerate; the first of equal points counts. */
 static PetscErrorCode KeepDifferent(HycoInterpolant it, const PetscReal points[])
@@ -126,7 +126,7 @@ static PetscErrorCode AddSimplex(HycoInterpolant it, const PetscInt vertex[])
   LAPACKgetrf_(&n, &n, edge, &n, pivot, &info);
   for (PetscInt p = 0; p < dim; p++) volume *= edge[p * dim + p];
   /* Triangulated points on a common circle (Qt) may give flat simplices; they cover nothing. */
-  if (info || PetscAbsReal(volume) < FLAT) PetscFunctionReturn(PETSC_SUCCESS);
+  if (info || PetscAbsReal(volume) < FLAT_SIMPLEX) PetscFunctionReturn(PETSC_SUCCESS);
   LAPACKgetri_(&n, edge, &n, pivot, work, &room, &info);
   if (info) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscArraycpy(it->simplex + it->n_simplices * (dim + 1), vertex, dim + 1));
@@ -273,7 +273,7 @@ static void SimplexWeights(HycoInterpolant it, const PetscReal x[], PetscReal we
   PetscReal best[9], highest = -PETSC_MAX_REAL, sum = 0;
   PetscInt at = 0;
 
-  for (PetscInt s = 0; s < it->n_simplices && highest < -FLAT; s++) {
+  for (PetscInt s = 0; s < it->n_simplices && highest < -FLAT_SIMPLEX; s++) {
     const PetscInt *vertex = it->simplex + s * (dim + 1);
     const PetscReal *inverse = it->inverse + (size_t)s * (size_t)(dim * dim);
     PetscReal b[9] = {1}, lowest;

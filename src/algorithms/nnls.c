@@ -94,7 +94,9 @@ static PetscBool MoveTowards(Passive *f, const PetscReal A[], const PetscReal b[
   return PETSC_FALSE;
 }
 
-#define TIE 1e-8 /* gradients with a smaller relative difference count as equal: the first column is taken */
+/* Of a gradient: equal columns differ by the round-off of their norms, 1e-14 with the condition 1e6; the first is then
+   taken on every number of ranks (tests/unit/nnls.c). */
+#define TIED_GRADIENT 1e-8
 
 /* r = b - A x = b - Q Q^T b, and the gradient w = A^T r. */
 static void NNLSGradient(const Passive *f, const PetscReal A[], const PetscReal b[], PetscReal r[], PetscReal w[])
@@ -150,7 +152,7 @@ PetscErrorCode HycoNNLSMonitored(PetscInt m, PetscInt n, const PetscReal A[], co
     PetscInt best = -1;
 
     for (PetscInt j = 0; j < n; j++) {
-      if (!passive[j] && !banned[j] && w[j] > tol && (best < 0 || w[j] > (1 + TIE) * w[best])) best = j;
+      if (!passive[j] && !banned[j] && w[j] > tol && (best < 0 || w[j] > (1 + TIED_GRADIENT) * w[best])) best = j;
     }
     if (best < 0) break;
     banned[best] = PETSC_TRUE; /* until the set changes */

@@ -7,9 +7,9 @@
 #include <hycoalgorithms.h>
 #include <petscblaslapack.h>
 
-#define INNER_ITS 1000  /* projected-gradient iterations for one half */
-#define STEPS     20    /* trial step lengths of one projected gradient */
-#define ROUND_OFF 1e-14 /* norm of a gradient due to round-off, S scaled to norm 1 */
+#define INNER_ITS          1000  /* projected-gradient iterations for one half */
+#define STEPS              20    /* trial step lengths of one projected gradient */
+#define GRADIENT_ROUND_OFF 1e-14 /* of the matrix, scaled to norm 1: 45 eps, a gradient's round-off */
 
 /* C = op(A) op(B), m x n with inner dimension k, column major, contiguous. */
 static PetscErrorCode NNMFProduct(const char transpose[2], PetscInt m, PetscInt n, PetscInt k, const PetscReal A[],
@@ -192,13 +192,13 @@ static PetscErrorCode NNMFAlternate(PetscInt m, PetscInt n, PetscInt k, const Pe
     }
     if (it == 0) {
       first = PetscSqrtReal(norm[0] * norm[0] + norm[1] * norm[1]);
-      tol[0] = tol[1] = PetscMax(1e-3 * first, ROUND_OFF);
+      tol[0] = tol[1] = PetscMax(1e-3 * first, GRADIENT_ROUND_OFF);
     }
-    if (norm[0] + norm[1] <= PetscMax(1e-8 * first, ROUND_OFF)) break; /* stationary */
+    if (norm[0] + norm[1] <= PetscMax(1e-8 * first, GRADIENT_ROUND_OFF)) break; /* stationary */
     for (PetscInt f = 0; f < 2; f++) {
       PetscCall(SetHalf(m, n, k, S, (PetscBool)(f == 0), factor[1 - f], G, C, &h));
       PetscCall(SolveHalf(&h, tol[f], factor[f], &its));
-      if (its == 0) tol[f] = PetscMax(tol[f] / 10, ROUND_OFF);
+      if (its == 0) tol[f] = PetscMax(tol[f] / 10, GRADIENT_ROUND_OFF);
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -237,7 +237,7 @@ PetscErrorCode HycoNNMF(PetscInt m, PetscInt n, const PetscReal S[], PetscInt k,
   if (norm == 0) PetscFunctionReturn(PETSC_SUCCESS);
   norm = PetscSqrtReal(norm);
   PetscCall(PetscMalloc4(m * n, &scaled, k * m, &Wt, k * n, &H, k * k + 4 * k * PetscMax(m, n), &room));
-  /* ROUND_OFF is absolute, while forces may have any unit. */
+  /* GRADIENT_ROUND_OFF is absolute, while forces may have any unit. */
   for (PetscInt i = 0; i < m * n; i++) scaled[i] = S[i] / norm;
   PetscCall(NNMFStart(m, n, scaled, k, Wt, H));
   PetscCall(NNMFAlternate(m, n, k, scaled, max_its, Wt, H, room));

@@ -7,8 +7,10 @@
 #include <hycoalgorithms.h>
 #include <petscblaslapack.h>
 
-/* Limit for taking a mode: relative error of its singular value, cosine with previous modes. */
-#define ACCURATE    1e-3
+/* Of a mode's singular value, its recomputed error: a mode with three digits serves; of the SVDs that lose accuracy the
+   modes at round-off have none (tests/training/pod_types.py). */
+#define ACCURATE_VALUE 1e-3
+/* Cosine of the angle between modes: the energies of (18) then add up to 9 digits (tests/training/pod_types.py). */
 #define ORTHONORMAL 1e-9
 #define FIRST       16 /* number of triplets requested at first; doubled until sufficient */
 
@@ -153,7 +155,7 @@ static PetscErrorCode CountAccurate(Mat S, Mat V, PetscInt k, const PetscReal si
     const PetscReal s = sigma[*accurate];
 
     /* The first inaccurate mode ends the basis, since all after it have smaller singular values. */
-    if (!(PetscAbsReal(stretch[*accurate] - s) <= ACCURATE * s && skew[*accurate] <= ORTHONORMAL)) break;
+    if (!(PetscAbsReal(stretch[*accurate] - s) <= ACCURATE_VALUE * s && skew[*accurate] <= ORTHONORMAL)) break;
   }
   HycoFreeAll(&stretch, &skew);
   PetscFunctionReturn(PETSC_SUCCESS);

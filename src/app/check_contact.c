@@ -2,14 +2,17 @@
 #include "check.h"
 #include <string.h>
 
-/* Facets of the slave larger than the master's by this factor are reported as coarser, a modulus as stiffer. */
+/* Of the master's facets, the slave's: above it the slave is reported as coarser; half as large again, so that meshes
+   of one size never are (tests/command/check.py). */
 #define COARSER 1.5
-/* Of second order pressures alternate from node to node, by 8 to 13 % of the peak, if the slave is finer by more than
-   this. */
-#define FINER   0.5
+/* Of the master's facets, a second-order slave's: below it pressures alternate by 8 to 13 % of the peak from node to
+   node (tests/contact/mortar.py). */
+#define FINER 0.5
+/* Of the master's modulus, the slave's: above it the slave is reported as stiffer; half as large again, so that equal
+   materials never are (tests/command/check.py). */
 #define STIFFER 1.5
-/* A smallest gap above this share of the mesh's extent does not close by small displacements. */
-#define FAR 0.1
+/* Of the mesh's extent, the smallest gap of a contact: a larger one does not close by small displacements. */
+#define DISTANT 0.1
 
 /* Rank 0, as the other parts of the report: the inspection is complete there. */
 PetscErrorCode CheckReportTies(Check *check)
@@ -67,7 +70,7 @@ static void ContactCheckWarn(Check *check, const HycoContactInspection *c)
     CheckReportWarning(
         check, "contact %s never faces its master: no node of %s faces %s at any of the points that were assembled",
         c->name, c->slave, c->master);
-  else if (c->master && c->gap_min > FAR * length)
+  else if (c->master && c->gap_min > DISTANT * length)
     CheckReportWarning(
         check, "contact %s: the smallest gap is %.3g, %.2g of the mesh's extent; small displacements cannot close it",
         c->name, (double)c->gap_min, (double)(c->gap_min / length));

@@ -7,8 +7,10 @@
 #include <string.h>
 #include <strings.h>
 
-#define MOST  64   /* parameters */
-#define UNMET 1e-3 /* a misfit above it means that the targets are not met */
+#define MOST 64 /* parameters */
+/* Misfit above which a fit says that its targets are not met: relative to the targets, as a target is known to three
+   digits. */
+#define UNMET 1e-3
 
 typedef struct {
   HycoROM model;

@@ -39,7 +39,8 @@ static PetscErrorCode ReportGroups(cJSON *json, HycoReducer reducer)
 }
 
 #define TIMED 25 /* predictions for their time */
-#define LONG  1. /* seconds after which fewer are enough */
+/* Seconds after which the time of a prediction is known from fewer: a training's report may take no longer. */
+#define LONGEST_TIMING 1.
 
 /* The mean processor time of predictions by the written model, with outputs and estimates, as a set makes them. Rank
    0. */
@@ -55,7 +56,7 @@ static PetscErrorCode TimeModel(HycoScene scene, const char path[], PetscReal *e
   PetscCall(HycoSamplesAddScattered(points, TIMED));
   PetscCall(HycoSamplesGet(points, &n, &n_par, &mu));
   PetscCall(HycoROMLoad(path, &m));
-  for (*each = 0; k < n && *each < LONG; k++) {
+  for (*each = 0; k < n && *each < LONGEST_TIMING; k++) {
     HycoPrediction p;
 
     PetscCall(HycoROMPredict(m, n_par, mu + k * n_par));

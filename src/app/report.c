@@ -6,8 +6,9 @@
 #include <strings.h>
 #include <sys/resource.h>
 
-#define LONG          0.06 /* default steps stay below */
-#define REPORT_FORMAT 1    /* raised when a key changes its meaning or goes; new keys do not raise it */
+/* Error in time above which a report says so: default steps stay below in tests/paths. */
+#define LARGE_TIME_ERROR 0.06
+#define REPORT_FORMAT    1 /* raised when a key changes its meaning or goes; new keys do not raise it */
 
 /* A column of a table: over the rows that converged, its mean and largest value, and their number. */
 typedef struct {
@@ -64,10 +65,10 @@ PetscErrorCode DriverWarnSteps(PetscReal time_error)
   PetscFunctionBegin;
   if (!(time_error > 0)) PetscFunctionReturn(PETSC_SUCCESS);
   DriverPercent(time_error, share);
-  PetscCall(
-      DriverPrint("%sestimated error of creep strains by the time steps: %s of the largest%s\n",
-                  time_error > LONG ? "LONG TIME STEPS: " : "", share,
-                  time_error > LONG ? "; give none or more of -hyco_substeps, or a smaller -hyco_step_error" : ""));
+  PetscCall(DriverPrint(
+      "%sestimated error of creep strains by the time steps: %s of the largest%s\n",
+      time_error > LARGE_TIME_ERROR ? "LONG TIME STEPS: " : "", share,
+      time_error > LARGE_TIME_ERROR ? "; give none or more of -hyco_substeps, or a smaller -hyco_step_error" : ""));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

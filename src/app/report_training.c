@@ -175,8 +175,10 @@ static void KeepFastest(Search *s, const HycoAttempt *a)
   if (!s->fastest.number || a->cost < s->fastest.cost) s->fastest = *a;
 }
 
-#define FASTER 2   /* times: a smaller gain is none to mention */
-#define WIDER  1.1 /* a target, over the error that shall meet it */
+#define FASTER 2 /* times: a smaller gain is none to mention */
+/* Target over the error that shall meet it, in an advice: a tenth, since a repeated training differs in the last
+   digits. */
+#define WIDER_TARGET 1.1
 
 /* The trade that the search has met and not taken, with the targets that take it. */
 static PetscErrorCode PrintFaster(const Search *s, const HycoTraining *t)
@@ -192,7 +194,7 @@ static PetscErrorCode PrintFaster(const Search *s, const HycoTraining *t)
   DescribeErrors(IsPath(s), a->held_out.largest, errors);
   for (size_t j = 0; j < (IsPath(s) ? 4 : 3); j++)
     at += (size_t)snprintf(targets + at, sizeof(targets) - at, " -target_%s %.2g", HycoErrorKinds[kinds[j]],
-                           WIDER * (double)a->held_out.largest[kinds[j]]);
+                           WIDER_TARGET * (double)a->held_out.largest[kinds[j]]);
   PetscCall(DriverPrint("faster: settings %d take %.3g ms with %s; to have them:%s\n", (int)a->number,
                         1e3 * (double)a->held_out.seconds, errors, targets));
   PetscFunctionReturn(PETSC_SUCCESS);

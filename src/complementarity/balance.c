@@ -9,8 +9,8 @@
 #include <string.h>
 
 #define MOST_STEPS 200
-#define BALANCED   1e-9  /* of the load: below it forces balance */
-#define AGAINST    1e-10 /* work of a ray relative to its length and the motion's: below it no ray resists */
+/* Of the length of a ray times that of a motion, their work: below it no ray resists; a tenth of HYCO_BALANCED. */
+#define RESISTS 1e-10
 
 PetscErrorCode HycoNormalsBalance(PetscInt p, PetscInt n, const PetscReal A[], const PetscReal f[], PetscReal rounding,
                                   PetscReal r[], PetscBool *exists)
@@ -20,7 +20,7 @@ PetscErrorCode HycoNormalsBalance(PetscInt p, PetscInt n, const PetscReal A[], c
   PetscFunctionBegin;
   for (PetscInt i = 0; i < p; i++) size += f[i] * f[i];
   PetscCall(HycoNNLS(p, n, A, f, r, &rest));
-  *exists = (PetscBool) !(rest > PetscMax(BALANCED * PetscSqrtReal(size), rounding));
+  *exists = (PetscBool) !(rest > PetscMax(HYCO_BALANCED * PetscSqrtReal(size), rounding));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -88,7 +88,7 @@ static void BalanceRenew(const HycoBlocks *b, PetscInt p, const PetscReal A[], c
     PetscReal *ray = rays->ray + kept * HYCO_MAX_BLOCK, *column = rays->column + kept * p, work, length;
 
     BalanceBest(b, k, p, A, d, ray, &work, &length);
-    if (!(work > AGAINST * length * size)) continue;
+    if (!(work > RESISTS * length * size)) continue;
     *against = PETSC_TRUE;
     for (PetscInt i = 0; i < p; i++) {
       column[i] = 0;
@@ -117,7 +117,7 @@ PetscErrorCode HycoBlocksBalance(const HycoBlocks *b, PetscInt p, const PetscRea
   PetscCall(PetscArraycpy(d, f, p));
   for (PetscInt i = 0; i < p; i++) size += f[i] * f[i];
   rest = size = PetscSqrtReal(size);
-  least = PetscMax(BALANCED * size, rounding);
+  least = PetscMax(HYCO_BALANCED * size, rounding);
   for (PetscInt k = 0; k < MOST_STEPS && known && rest > least; k++) {
     BalanceRenew(b, p, A, d, &rays, &against);
     if (!against) break;

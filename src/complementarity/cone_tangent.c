@@ -13,11 +13,12 @@
 #include <hycolcp.h>
 #include <petscblaslapack.h>
 
-#define CLOSED  1e-7  /* share of the largest force or gap below which a contact may open or close, */
-#define BORDER  1e-9  /* of friction, or of displacements, below which a contact may stick or slip */
-#define CHANGES 1e-7  /* share of the largest rate: less is none */
-#define MEETS   1e-6  /* the same, of gaps that stay closed without a force */
-#define RANK    1e-10 /* singular values relative to the largest that count as 0 */
+/* Of friction mu r_n, or of the largest displacement: a tenth of the residual of the forces, 1e-8; nearer to it a
+   contact may stick or slip. */
+#define SLIP_BORDER 1e-9
+/* Of the largest rate, of gaps that stay closed without a force: ten times HYCO_RATE_ROUND_OFF, as they follow from
+   least squares of normals. */
+#define MEETS_RATE 1e-6
 
 static PetscReal ConeTangentLargest(PetscInt n, const PetscReal v[])
 {
@@ -69,12 +70,14 @@ static PetscBool ConeTangentKeepsState(PetscInt size, PetscReal mu, PetscReal d,
   const PetscReal force = TangentialNorm(size, r);
   PetscReal change = d * r[0] + mu * dr[0];
 
-  if (r[0] <= CLOSED * s->force && w[0] <= CLOSED * s->gap)
-    return (PetscBool)(PetscAbsReal(dr[0]) <= CHANGES * s->rate_r && PetscAbsReal(dw[0]) <= CHANGES * s->rate_w);
-  if (size == 1 || r[0] <= CLOSED * s->force) return PETSC_TRUE;
-  if (force < (1 - BORDER) * mu * r[0] || TangentialNorm(size, w) > BORDER * s->gap) return PETSC_TRUE;
+  if (r[0] <= HYCO_UNDECIDED * s->force && w[0] <= HYCO_UNDECIDED * s->gap)
+    return (PetscBool)(PetscAbsReal(dr[0]) <= HYCO_RATE_ROUND_OFF * s->rate_r &&
+                       PetscAbsReal(dw[0]) <= HYCO_RATE_ROUND_OFF * s->rate_w);
+  if (size == 1 || r[0] <= HYCO_UNDECIDED * s->force) return PETSC_TRUE;
+  if (force < (1 - SLIP_BORDER) * mu * r[0] || TangentialNorm(size, w) > SLIP_BORDER * s->gap) return PETSC_TRUE;
   for (PetscInt i = 1; i < size && force > 0; i++) change -= r[i] / force * dr[i];
-  return (PetscBool)(PetscAbsReal(change) <= CHANGES * s->rate_r && TangentialNorm(size, dw) <= CHANGES * s->rate_w);
+  return (PetscBool)(PetscAbsReal(change) <= HYCO_RATE_ROUND_OFF * s->rate_r &&
+                     TangentialNorm(size, dw) <= HYCO_RATE_ROUND_OFF * s->rate_w);
 }
 
 /* Whether a row of M is 0: its contact has no unknown. */
@@ -93,7 +96,7 @@ static PetscErrorCode ConeTangentFit(const HycoLCP *lcp, PetscInt m, const Petsc
   const PetscInt p = lcp->p, N = p + lcp->n;
   const PetscBLASInt rows = (PetscBLASInt)PetscMax(m, p), columns = (PetscBLASInt)p, one = 1;
   const PetscBLASInt room = 64 * columns + 5 * rows;
-  PetscReal *G, *rhs, *value, *work, tol = RANK;
+  PetscReal *G, *rhs, *value, *work, tol = HYCO_RANK;
   PetscBLASInt rank, info;
 
   PetscFunctionBegin;
@@ -139,7 +142,7 @@ static PetscErrorCode ConeTangentAtRest(const HycoLCP *lcp, const PetscReal befo
     }
   }
   for (PetscInt k = 0; k < b->n; k++) {
-    if (w[p + b->row[k]] <= CLOSED * size) closed[n_closed++] = p + b->row[k];
+    if (w[p + b->row[k]] <= HYCO_UNDECIDED * size) closed[n_closed++] = p + b->row[k];
   }
   /* Without forces w = q + G x. */
   ConeTangentMove(lcp, -1, z, w, t);
@@ -152,7 +155,7 @@ static PetscErrorCode ConeTangentAtRest(const HycoLCP *lcp, const PetscReal befo
   for (PetscInt i = p; i < N; i++) moved = PetscMax(moved, PetscAbsReal(t[i] + dq[i]));
   for (PetscInt i = p; i < N; i++) t[i] = -dq[i];
   ConeTangentMove(lcp, -1, dz, t, t);
-  if (moved > CLOSED * size) {
+  if (moved > HYCO_UNDECIDED * size) {
     /* What has moved the bodies on would overlap without that, and just touches. */
     *regular = (PetscBool)(n_closed > 0);
     if (n_closed) PetscCall(ConeTangentFit(lcp, n_closed, closed, t, dx));
@@ -160,7 +163,7 @@ static PetscErrorCode ConeTangentAtRest(const HycoLCP *lcp, const PetscReal befo
   for (PetscInt c = 0; c < p; c++) dz[c] += dx[c];
   ConeTangentMove(lcp, -1, dx, t, t);
   for (PetscInt i = 0; i < n_closed; i++)
-    *regular = (PetscBool)(*regular && PetscAbsReal(t[closed[i]]) <= MEETS * rate);
+    *regular = (PetscBool)(*regular && PetscAbsReal(t[closed[i]]) <= MEETS_RATE * rate);
   PetscCall(PetscFree2(slips, closed));
   PetscCall(PetscFree3(t, x, dx));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -7,12 +7,12 @@
 #include <hycolcp.h>
 #include <petscblaslapack.h>
 
-#define FREE  1e-14 /* squared share of a motion that the closed contacts resist: below, they leave it free */
-#define HELD  1e-12 /* of the largest force: smaller ones hold nothing */
-#define LAST  1e-12 /* squared weight of the motion itself, which decides what no slip of a closed contact does */
-#define HOLDS 1e-10 /* share of the largest force below which a force holds no motion that another would */
-#define EDGE  1e-6  /* of the tangential force: nearer to the border of the cone a contact slips */
-#define TINY  1e-12 /* of the largest gap or slip: round-off */
+/* Of the largest force: 4500 eps, a solve with the set's factor; smaller forces hold nothing. */
+#define HELD 1e-12
+/* Weight of a motion itself beside that of slips, whose square is round-off of 1: it decides only what no slip of a
+   closed contact does. */
+#define LAST_WEIGHT 1e-12
+#define TINY_SLIP   1e-12 /* of the largest gap or slip: 4500 eps, the least squares that make it */
 
 /* Coulomb's law: its first datum is the coefficient. */
 PetscBool HycoBlockHasFriction(const HycoBlocks *b, PetscInt k)
@@ -41,7 +41,7 @@ static PetscErrorCode FreeMotions(const HycoBlocks *b, PetscInt p, const PetscRe
   }
   LAPACKsyev_("V", "U", &size, gram, &size, value, work, &lwork, &info);
   PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev: %d", (int)info);
-  for (*n = 0; *n < p && value[*n] <= FREE; ++*n) {
+  for (*n = 0; *n < p && value[*n] <= HYCO_FREE_MOTION; ++*n) {
     for (PetscInt i = 0; i < p; i++) N[*n * p + i] = gram[*n * p + i] / scale[i];
   }
   PetscCall(PetscFree3(gram, value, work));
@@ -81,7 +81,7 @@ static PetscErrorCode LeastSlip(PetscInt n, PetscReal H[], const PetscReal g[], 
     PetscReal y = 0;
 
     for (PetscInt i = 0; i < n; i++) {
-      E[k * n + i] = H[k * n + i] / PetscSqrtReal(PetscMax(value[k], LAST * LAST));
+      E[k * n + i] = H[k * n + i] / PetscSqrtReal(PetscMax(value[k], LAST_WEIGHT * LAST_WEIGHT));
       y += E[k * n + i] * g[i];
     }
     for (PetscInt i = 0; i < n; i++) c[i] += y * E[k * n + i];
@@ -112,7 +112,7 @@ static PetscErrorCode KeepGaps(const HycoBlocks *b, PetscInt p, PetscInt n, cons
       for (PetscInt l = 0; l < n && !closed[k]; l++) M[i * b->n + k] -= a[l] * E[i * n + l];
       if (!closed[k]) q[k] -= a[i] * c[i];
     }
-    if (PetscAbsReal(q[k]) <= TINY * most) q[k] = 0;
+    if (PetscAbsReal(q[k]) <= TINY_SLIP * most) q[k] = 0;
     m += !closed[k];
   }
   *exists = PETSC_TRUE;
@@ -173,9 +173,9 @@ PetscErrorCode HycoBlocksFreeMotions(const HycoBlocks *b, PetscInt p, const Pets
     PetscReal shear = 0;
 
     for (PetscInt j = b->row[k] + 1; j < b->row[k + 1]; j++) shear += r[j] * r[j];
-    closed[k] = (PetscBool)(most > 0 && force > HOLDS * most);
-    slips[k] =
-        (PetscBool)(HycoBlockHasFriction(b, k) && PetscSqrtReal(shear) >= (1 - EDGE) * b->data[b->at[k]] * force);
+    closed[k] = (PetscBool)(most > 0 && force > HYCO_FORCE_ROUND_OFF * most);
+    slips[k] = (PetscBool)(HycoBlockHasFriction(b, k) &&
+                           PetscSqrtReal(shear) >= (1 - HYCO_CONE_BORDER) * b->data[b->at[k]] * force);
     for (PetscInt j = b->row[k] + 1; j < b->row[k + 1] && slips[k]; j++) {
       for (PetscInt i = 0; i < p; i++) f[i] += A[j * p + i] * r[j];
     }
@@ -212,7 +212,7 @@ PetscErrorCode HycoBlocksLeastSlip(const HycoBlocks *b, PetscInt p, const PetscR
   }
   for (PetscInt i = 0; i < p && *n; i++) {
     for (PetscInt k = 0; k < *n; k++) a[k] = N[k * p + i] * scale[i];
-    AddSquare(*n, LAST, a, -move[i] * scale[i], H, g);
+    AddSquare(*n, LAST_WEIGHT, a, -move[i] * scale[i], H, g);
   }
   if (*n) {
     PetscCall(LeastSlip(*n, H, g, c, E));

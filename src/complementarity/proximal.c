@@ -11,9 +11,14 @@
 #include <hycolcp.h>
 #include <petscblaslapack.h>
 
-#define SOFT     1e-4  /* kappa relative to the contacts' stiffness: the rate of convergence */
-#define BALANCED 1e-11 /* what the springs may carry in the end, as a share of load and contact forces */
-#define TANGENT  1e-10 /* of the largest closing of a contact: up to there a motion closes none */
+/* Stiffness of the springs as a share of the contacts': the rate of convergence of the proximal steps, two or three of
+   which end at 1e-11 (tests/contact/floating.py). */
+#define SOFT_SPRING 1e-4
+/* Of loads and contact forces, what springs may carry in the end: three digits below the residual of 1e-8
+   (tests/contact/floating.py). */
+#define SPRINGS_CARRY 1e-11
+/* Of the largest closing of a contact: 4.5e5 eps, a motion by least squares; up to there it closes none. */
+#define OPENS    1e-10
 #define MOST_ITS 200
 
 typedef struct {
@@ -40,8 +45,8 @@ static PetscReal ProximalClosingOf(const Proximal *h, PetscInt j, const PetscRea
   return sum;
 }
 
-/* Springs that are soft compared with the contacts that move their unknown. kappa_i = SOFT times the stiffness that
-   a contact gives to unknown i. */
+/* Springs that are soft compared with the contacts that move their unknown. kappa_i = SOFT_SPRING times the stiffness
+   that a contact gives to unknown i. */
 static void SetSprings(Proximal *h)
 {
   PetscReal most = 0;
@@ -51,7 +56,7 @@ static void SetSprings(Proximal *h)
       const PetscReal *A = ProximalColumn(h, j), *S = A + h->p;
 
       /* 1 / S_jj is the stiffness of contact j, A_ij its arm on unknown i. */
-      if (S[j] > 0) h->kappa[i] = PetscMax(h->kappa[i], SOFT * A[i] * A[i] / S[j]);
+      if (S[j] > 0) h->kappa[i] = PetscMax(h->kappa[i], SOFT_SPRING * A[i] * A[i] / S[j]);
     }
     most = PetscMax(most, h->kappa[i]);
   }
@@ -144,7 +149,7 @@ static PetscBool ProximalBalanced(const Proximal *h, const PetscReal L[])
       PetscReal size = PetscAbsReal(h->lcp->q[i]);
 
       for (PetscInt j = 0; j < h->m; j++) size += PetscAbsReal(ProximalColumn(h, j)[i]) * L[j];
-      if (pass) all = (PetscBool)(all && PetscAbsReal(h->r[i]) <= BALANCED * PetscMax(size, 1e-3 * most));
+      if (pass) all = (PetscBool)(all && PetscAbsReal(h->r[i]) <= SPRINGS_CARRY * PetscMax(size, 1e-3 * most));
       most = PetscMax(most, size);
     }
   }
@@ -173,7 +178,7 @@ static PetscBool ProximalIsFreeMotion(Proximal *h, const PetscReal L[], PetscRea
     const PetscReal closing = ProximalClosingOf(h, j, h->step), *S = ProximalColumn(h, j) + h->p;
     PetscReal w = h->lcp->q[h->p + j] - ProximalClosingOf(h, j, h->x);
 
-    if (closing <= TANGENT * size) continue;
+    if (closing <= OPENS * size) continue;
     none = PETSC_FALSE;
     for (PetscInt k = 0; k < h->m; k++) w += S[k] * L[k];
     /* A closed contact that the step would close further forbids any extra way. */

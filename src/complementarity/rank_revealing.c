@@ -8,10 +8,6 @@
 #include <hycolcp.h>
 #include <petscblaslapack.h>
 
-/* Pivots below this share of the (scaled) diagonal count as dependent: the round-off of a flexibility is about
-   1e-14. */
-#define DEPENDENT 1e-12
-
 /* A = D M_aa D with D = |diag|^-1/2 (0 for a contact with a zero diagonal). Contacts have different units and
    stiffnesses; the scaled matrix has a unit diagonal. */
 static void CopyScaled(PetscInt n, const PetscReal M[], PetscInt k, const PetscInt a[], PetscReal A[], PetscReal d[])
@@ -68,7 +64,7 @@ static PetscInt NextPivot(PetscInt k, const PetscReal A[], const PetscReal gap[]
   for (PetscInt i = 0; i < k; i++) {
     if (!kept[i]) largest = PetscMax(largest, PetscAbsReal(A[(size_t)i * (size_t)k + (size_t)i]));
   }
-  for (PetscInt i = 0; i < k && largest > DEPENDENT; i++) {
+  for (PetscInt i = 0; i < k && largest > HYCO_DEPENDENT; i++) {
     if (kept[i] || PetscAbsReal(A[(size_t)i * (size_t)k + (size_t)i]) < largest * (1 - 1e-8)) continue;
     /* Equal pivots are contacts that repeat each other: the one that closes first carries the force. */
     if (best < 0 || gap[i] < gap[best]) best = i;
@@ -156,10 +152,10 @@ PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscRea
   *singular = PETSC_FALSE;
   PetscCall(PetscArrayzero(z, n));
   if (!*k) PetscFunctionReturn(PETSC_SUCCESS);
-  if (factor) PetscCall(HycoSetFactorSolve(factor, M, q, *k, a, DEPENDENT, z, &regular));
+  if (factor) PetscCall(HycoSetFactorSolve(factor, M, q, *k, a, HYCO_DEPENDENT, z, &regular));
   if (regular) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1((size_t)*k * (size_t)*k, &A));
-  if (!factor) PetscCall(TrySet(n, M, q, symmetric, symmetric ? DEPENDENT : 1e-15, *k, a, A, z, &regular));
+  if (!factor) PetscCall(TrySet(n, M, q, symmetric, symmetric ? HYCO_DEPENDENT : 1e-15, *k, a, A, z, &regular));
   if (!regular) {
     PetscCall(PetscMalloc2(*k, &d, *k, &kept));
     CopyScaled(n, M, *k, a, A, d);

@@ -15,8 +15,9 @@
 #include <hycolcp.h>
 #include <petscblaslapack.h>
 
-#define FREE 1e-14 /* squared share of a motion that contacts meet: below, it is round-off */
-#define LOAD 1e-10 /* share of the loads on such a motion that is round-off */
+/* Of the loads, along a motion that no contact meets: 4.5e5 eps, the work of thousands of loads
+   (tests/contact/floating.py). */
+#define FREE_LOAD 1e-10
 
 typedef struct {
   PetscInt p, m, n; /* numbers of pinned unknowns, contacts, both */
@@ -208,9 +209,10 @@ static PetscErrorCode SolveChange(Floating *h, const PetscReal r[], PetscBool ac
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define SPANS 1e-12 /* squared share of a column that others do not have: above, it is independent of them */
-#define FEW   200   /* closed contacts: with more, the primal method, which changes one at a time, takes too long */
-#define RESTS 1e-9  /* share of the load that no forces balance */
+/* Of the square of a column, what others leave of it: its length to 1e-6, far above the round-off of normals and below
+   their angles on a smooth mesh. */
+#define SPANS 1e-12
+#define FEW   200 /* closed contacts: with more, the primal method, which changes one at a time, takes too long */
 
 /* The part of column j of A that is independent of `rank` orthonormal Q, as a share of its squared length; it is
    appended to Q if `append`. */
@@ -280,7 +282,7 @@ static PetscErrorCode SemidefiniteBegin(Floating *h, PetscBool active[], PetscRe
   for (PetscInt j = 0; j < h->m; j++)
     PetscCall(PetscArraycpy(A + j * h->p, h->M + (size_t)(h->p + j) * (size_t)h->n, h->p));
   PetscCall(HycoNNLS(h->p, h->m, A, f, z + h->p, &rest));
-  *exists = (PetscBool)(rest <= RESTS * PetscSqrtReal(size));
+  *exists = (PetscBool)(rest <= HYCO_BALANCED * PetscSqrtReal(size));
   for (PetscInt j = 0; j < h->m; j++) active[j] = (PetscBool)(z[h->p + j] > 0);
   PetscCall(PetscFree2(A, f));
   if (*exists) PetscCall(SemidefiniteSpan(h, active));
@@ -426,7 +428,9 @@ static PetscErrorCode SemidefiniteContinue(const HycoActiveSet *e, const HycoLCP
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define UNBALANCED 1e-12 /* share of the terms of equilibrium: more, and the solution is corrected once */
+/* Of the terms of equilibrium: 4500 eps; more, and the solution is corrected once (tests/contact/floating.py, tiny
+   loads beside loads that balance themselves). */
+#define UNBALANCED 1e-12
 
 /* Corrects the solution on the set where the round-off of large gaps leaves a part of a tiny load. */
 static PetscErrorCode SemidefiniteCorrect(Floating *h, PetscBool active[], PetscReal z[])
@@ -490,12 +494,12 @@ static PetscErrorCode HoldFree(HycoLCP *lcp, PetscReal **M, PetscReal **q)
   LAPACKsyev_("V", "U", &rows, gram, &rows, value, work, &lwork, &info);
   PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev: %d", (int)info);
   for (PetscInt i = 0; i < p; i++) size += lcp->q[i] * lcp->q[i];
-  for (PetscInt k = 0; k < p && value[k] <= FREE * value[p - 1] && most > 0; k++) {
+  for (PetscInt k = 0; k < p && value[k] <= HYCO_FREE_MOTION * value[p - 1] && most > 0; k++) {
     const PetscReal *v = gram + k * p;
     PetscReal load = 0;
 
     for (PetscInt i = 0; i < p; i++) load += v[i] * lcp->q[i];
-    if (PetscAbsReal(load) > LOAD * PetscSqrtReal(size)) continue;
+    if (PetscAbsReal(load) > FREE_LOAD * PetscSqrtReal(size)) continue;
     if (!*M) {
       HycoDuplicate(n * n, lcp->M, M);
       HycoDuplicate(n, lcp->q, q);

@@ -19,28 +19,45 @@
 #include "semismooth.h"
 #include <petscblaslapack.h>
 
-#define MOST_ITS    100   /* of Newton's method from one start */
-#define MOST_SWEEPS 30    /* of Gauss-Seidel before a start */
-#define MOST_STEPS  100   /* of the proximal point method */
-#define MOST_FROZEN 3     /* steps with frozen admissible forces before a start */
-#define MOST_LEAST  1000  /* rows up to which a singular J is solved by least squares */
-#define RANK_TOL    1e-10 /* of motions: singular values relative to the largest that count as 0 */
-#define GAPS        1e-4  /* share of the forces that would close the gaps or were there before: round-off of these */
-#define LOCKED      1e-6  /* share of the forces before: below it friction has locked nothing in */
-#define SHIFT       1e-3  /* alpha relative to M's diagonal: the proximal point method's rate of convergence */
-#define TIGHT       1e-14 /* |F| relative to the forces: nothing is left to gain */
-#define ENOUGH      1e-12 /* the same: no step is tried */
-#define SOLVED      1e-10 /* the same: solved, and round-off if a step does not halve it */
-#define NEAR        1e-6  /* the same: near a solution */
-#define CONTRACTS   0.2   /* of |F| in a step: more, and a factor of another J is made again */
-#define LEAST_STEP  (1. / 64)
-#define TINY_STEP   (1. / 65536) /* where no longer one decreases |F| */
-#define MARGIN      1e-6         /* of tangential forces: nearer to the border of the cone a contact may slip */
-#define MOST_SOFT   12           /* motions on soft supports: of two bodies */
-#define STIFFER     1e-4 /* springs of motions in units of a contact's stiffness: they move no force, and hold */
-#define SOFT        1e-2 /* of the largest flexibility: what is left without them */
-#define CLOSE       0.1  /* |F| relative to the forces: Newton's method is tried from a proximal step */
-#define MOST_ALL    200  /* iterations of all starts after which no proximal step begins */
+#define MOST_ITS    100  /* of Newton's method from one start */
+#define MOST_SWEEPS 30   /* of Gauss-Seidel before a start */
+#define MOST_STEPS  100  /* of the proximal point method */
+#define MOST_FROZEN 3    /* steps with frozen admissible forces before a start */
+#define MOST_LEAST  1000 /* rows up to which a singular J is solved by least squares */
+/* Of the forces that would close the gaps, or of those before: forces that are smaller are judged by this size, because
+   they are round-off of these (tests/contact/friction.py). */
+#define SMALLEST_FORCES 1e-4
+/* Of the forces before: below it friction has locked nothing in; 100 times their residual of 1e-8
+   (tests/contact/floating.py, bodies without a load). */
+#define LOCKED 1e-6
+#define SHIFT  1e-3  /* alpha of the proximal point method as a share of M's diagonal: its rate of convergence */
+#define TIGHT  1e-14 /* of the forces, |F|: 45 eps, nothing is left to gain */
+/* Of the forces, |F|: 4500 eps, a product with M; half of the iterations on fine meshes gained nothing below it
+   (scripts/bench-friction). */
+#define NO_FURTHER_STEP 1e-12
+/* Of the forces, |F|: a hundredth of the residual of 1e-8 that the caller accepts, and round-off if a step does not
+   halve it. */
+#define SOLVED 1e-10
+/* Of the forces, |F|: below it w is computed anew, because the round-off of updates is 1e-14 times some hundred steps.
+   */
+#define NEAR_SOLUTION 1e-6
+/* Share of a step, the shortest at first: six halvings; a lap joint took as few iterations as with full steps
+   (scripts/friction). */
+#define LEAST_STEP (1. / 64)
+/* Share of a step, the shortest where no longer one decreases |F|: bodies on soft springs run far past the border of
+   the cone (tests/contact/friction_random.py). */
+#define TINY_STEP (1. / 65536)
+#define MOST_SOFT 12 /* motions on soft supports: of two bodies */
+/* Springs of motions as a share of a contact's stiffness, in the start with normal forces alone: as in the proximal
+   method they move no force, and hold. */
+#define START_SPRING 1e-4
+/* Of the largest flexibility, what is left without motions on soft springs: springs of 1e-2 of the bodies' stiffness or
+   less are motions (tests/contact/friction_random.py). */
+#define SOFT_PART 1e-2
+/* Share of the forces, |F|, from which a proximal step is followed by Newton's method: at larger ones the set of
+   slipping contacts is another one (tests/contact/friction_random.py). */
+#define TRY_NEWTON 0.1
+#define MOST_ALL   200 /* iterations of all starts after which no proximal step begins */
 
 typedef struct {
   const HycoLCP *lcp;
@@ -90,7 +107,7 @@ static PetscErrorCode TakeSoft(const Newton *h, PetscReal d[], PetscBool *soft)
     for (PetscInt i = 0; i < n; i++) {
       if (rest[i] > rest[at]) at = i;
     }
-    if (!(rest[at] > SOFT * most)) break;
+    if (!(rest[at] > SOFT_PART * most)) break;
     root = PetscSqrtReal(rest[at]);
     PetscCall(PetscArraycpy(v, h->M + (size_t)at * (size_t)n, n));
     for (PetscInt j = 0; j < k; j++) {
@@ -181,7 +198,8 @@ static PetscErrorCode SemismoothEvaluate(Newton *h, const PetscReal z[], PetscRe
   h->judged = PetscSqrtReal(judged);
   /* Forces that cancel, or vanish, leave round-off of the size of those that would close the gaps, or were there
      before. */
-  *size = most > 0 ? PetscMax(most, GAPS * PetscMax(least, h->start)) : PetscMax(least, GAPS * h->start);
+  *size = most > 0 ? PetscMax(most, SMALLEST_FORCES * PetscMax(least, h->start))
+                   : PetscMax(least, SMALLEST_FORCES * h->start);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -215,7 +233,7 @@ static PetscErrorCode SemismoothSearch(Newton *h, PetscReal shortest, PetscReal 
   /* Near round-off only the full step is tried, and half is enough. */
   const PetscReal before = *norm, least = before <= SOLVED * *size ? 1 : shortest;
   const PetscReal share = before <= SOLVED * *size ? 0.5 : 1e-4;
-  const PetscBool near = (PetscBool)(before <= NEAR * *size);
+  const PetscBool near = (PetscBool)(before <= NEAR_SOLUTION * *size);
   PetscReal *trial = h->trial, *w = h->trial + h->n, *change = h->trial + 2 * h->n;
 
   PetscFunctionBegin;
@@ -236,7 +254,7 @@ static PetscErrorCode SemismoothSearch(Newton *h, PetscReal shortest, PetscReal 
   if (*less) {
     PetscCall(PetscArraycpy(z, trial, h->n));
     /* Passing into the neighbourhood of the solution: w anew, without the drift of updates. */
-    if (!near && *norm <= NEAR * *size) PetscCall(SemismoothResidual(h, z, norm, size));
+    if (!near && *norm <= NEAR_SOLUTION * *size) PetscCall(SemismoothResidual(h, z, norm, size));
   } else {
     PetscCall(PetscArraycpy(h->w, w, h->n));
     PetscCall(SemismoothEvaluate(h, z, norm, size));
@@ -292,12 +310,12 @@ static PetscErrorCode SemismoothImprove(Newton *h, PetscReal z[], PetscReal *nor
 
   PetscFunctionBegin;
   *less = PETSC_FALSE;
-  PetscCall(SemismoothStep(h, z, (PetscBool)(*norm <= NEAR * *size), PETSC_FALSE, regular));
+  PetscCall(SemismoothStep(h, z, (PetscBool)(*norm <= NEAR_SOLUTION * *size), PETSC_FALSE, regular));
   /* By least squares below: else a body would run away along a motion that no force acts on. */
   if (*regular && !(h->smooth && h->linear->nearly_singular && h->linear->m <= MOST_LEAST))
     PetscCall(SemismoothSearch(h, LEAST_STEP, z, norm, size, less));
   /* A new factor where the present one does not contract; the next step begins with it. */
-  if (*less && lagged && *norm > CONTRACTS * before) PetscCall(HycoConeStepRenew(h->linear));
+  if (*less && lagged && *norm > HYCO_LAGGED_CONTRACTION * before) PetscCall(HycoConeStepRenew(h->linear));
   if (!*less && *norm > SOLVED * *size &&
       !(h->smooth && h->linear->nearly_singular)) { /* by the residual, with a factor of J itself */
     PetscCall(HycoConeStepRenew(h->linear));
@@ -324,7 +342,7 @@ static PetscErrorCode SemismoothIterate(Newton *h, PetscReal z[], HycoLCPStatus 
 
   PetscFunctionBegin;
   PetscCall(SemismoothResidual(h, z, &norm, &size));
-  for (PetscInt k = 0; k < most && norm > ENOUGH * size && regular && less; k++) {
+  for (PetscInt k = 0; k < most && norm > NO_FURTHER_STEP * size && regular && less; k++) {
     PetscInt changes;
 
     PetscCall(HycoConeStepDerive(h->linear, h->blocks, h->y, &changes));
@@ -377,7 +395,7 @@ static PetscErrorCode SemismoothSweep(Newton *h, PetscInt sweeps, PetscReal z[])
 static PetscErrorCode FitMotions(Newton *h, const PetscBool in[], const PetscReal target[], PetscReal z[])
 {
   const PetscBLASInt one = 1;
-  PetscReal *A, *rhs, *value, *work, tol = RANK_TOL;
+  PetscReal *A, *rhs, *value, *work, tol = HYCO_RANK;
   PetscBLASInt n, p, m = 0, room, rank, info = 0;
 
   PetscFunctionBegin;
@@ -404,7 +422,7 @@ static PetscErrorCode SemismoothIsSticking(const Newton *h, PetscInt k, const Pe
   PetscReal more[HYCO_MAX_BLOCK], admitted[HYCO_MAX_BLOCK];
 
   PetscFunctionBegin;
-  for (PetscInt i = 0; i < size; i++) more[i] = i ? z[i] * (1 + MARGIN) : z[i];
+  for (PetscInt i = 0; i < size; i++) more[i] = i ? z[i] * (1 + HYCO_CONE_BORDER) : z[i];
   PetscCall(HycoBlockProject(h->blocks, k, more, admitted));
   PetscCall(PetscArraycmp(more, admitted, size, sticks));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -584,7 +602,7 @@ static PetscErrorCode FromNormal(Newton *h, PetscReal z[], HycoLCPStatus *status
     for (PetscInt i = 0; i < m; i++)
       M[(size_t)j * (size_t)m + (size_t)i] = h->M[(size_t)row[j] * (size_t)h->n + (size_t)row[i]];
     /* What soft springs alone resist without friction must not run far away: it is of no use to the start. */
-    if (j < p && h->lcp->springs) M[(size_t)j * (size_t)(m + 1)] += STIFFER * h->flexibility;
+    if (j < p && h->lcp->springs) M[(size_t)j * (size_t)(m + 1)] += START_SPRING * h->flexibility;
   }
   /* Floating bodies start with all contacts closed (semidefinite.c); others from the contacts with a force. */
   for (PetscInt k = 0; k < b->n; k++) active[k] = (PetscBool)(p > 0 || z[row[k]] > 0);
@@ -726,7 +744,7 @@ static PetscErrorCode SemismoothProximal(Newton *h, PetscReal z[], HycoLCPStatus
     *status = h->judged <= SOLVED * size ? HYCO_LCP_SOLVED : HYCO_LCP_LIMIT;
     done = (PetscBool)(done || norm <= TIGHT * size || (*status == HYCO_LCP_SOLVED && norm > before / 2));
     before = norm;
-    if (*status == HYCO_LCP_SOLVED || norm > CLOSE * size) continue;
+    if (*status == HYCO_LCP_SOLVED || norm > TRY_NEWTON * size) continue;
     PetscCall(TryFrom(h, z, copy, status));
     done = (PetscBool)(done || *status == HYCO_LCP_SOLVED);
   }

@@ -2,13 +2,18 @@
 #include "semismooth.h"
 #include <petscblaslapack.h>
 
-#define RANK_TOL    1e-10 /* singular values of A relative to the largest that count as 0 */
-#define SINGULAR    1e-8  /* least pivot of A relative to the largest: below, least squares may give another step */
-#define LEAST_SHARE 2 /* the base changes once half of its unknowns would be updated: their solves cost a factor then */
-#define NEAR        0.3   /* largest change of an entry of DP at which the base may stand for it */
-#define HOMOGENEOUS 1e-14 /* P(y) - DP y relative to y: round-off */
-#define ROUNDING    1e-13 /* rows of DP relative to the longest that count as 0 */
-#define INFLEXIBLE  1e-12 /* diagonal entry of M relative to its block's largest that counts as 0 */
+/* Of the largest pivot, the least one: half of the digits are lost; least squares may then give another step. */
+#define NEARLY_SINGULAR 1e-8
+/* The base changes once half of its unknowns would be updated: their solves cost a factor then. */
+#define LEAST_SHARE 2
+/* Change of an entry of DP up to which its base may stand for it: the rod with friction in 3D takes half the time with
+   the results of before to 1e-10 (scripts/friction-rod). */
+#define NEAR_BASE   0.3
+#define HOMOGENEOUS 1e-14 /* of y, P(y) - DP y: 45 eps, two evaluations of a cone's projection */
+#define EMPTY_ROW   1e-13 /* of the longest row of DP: 450 eps, a product of two projections */
+/* Of the block's largest diagonal entry of M: 4500 eps, a solve with K's factor; on a plane of symmetry the entry is 0.
+   */
+#define INFLEXIBLE 1e-12
 
 /* Room for m = n unknowns: A is n x n at most. blocks and rho are borrowed until Destroy. */
 PetscErrorCode HycoConeStepCreate(PetscInt p, const HycoBlocks *blocks, const PetscReal rho[], HycoConeStep *t)
@@ -134,7 +139,7 @@ static PetscInt SemismoothStepFactorise(HycoConeStep *t, PetscInt k, PetscBool a
 
     if (!a) most = length;
     /* The rest of the rows is dependent: the rank is a. */
-    if (!(length > ROUNDING * most)) return a;
+    if (!(length > EMPTY_ROW * most)) return a;
     for (PetscInt i = 0; i < size && add; i++) {
       for (PetscInt j = 0; j < size; j++) E[i] += D[i * size + j] * L[a][j];
     }
@@ -168,7 +173,7 @@ static PetscBool IsNear(const HycoConeStep *t, PetscInt k)
 {
   if (t->rank[k] != t->base_rank[k]) return PETSC_FALSE;
   for (PetscInt i = k * HYCO_BLOCK; i < (k + 1) * HYCO_BLOCK; i++) {
-    if (PetscAbsReal(t->DP[i] - t->base[i]) > NEAR) return PETSC_FALSE;
+    if (PetscAbsReal(t->DP[i] - t->base[i]) > NEAR_BASE) return PETSC_FALSE;
   }
   return PETSC_TRUE;
 }
@@ -351,14 +356,14 @@ static void SemismoothStepFactor(HycoConeStep *t)
     least = PetscMin(least, PetscAbsReal(t->A[(size_t)a * (size_t)(t->m + 1)]));
     most = PetscMax(most, PetscAbsReal(t->A[(size_t)a * (size_t)(t->m + 1)]));
   }
-  if (least < SINGULAR * most) t->nearly_singular = PETSC_TRUE;
+  if (least < NEARLY_SINGULAR * most) t->nearly_singular = PETSC_TRUE;
 }
 
 /* The shortest a of the least squares of an A without full rank. */
 static PetscErrorCode LeastSquares(HycoConeStep *t, PetscBLASInt *info)
 {
   const PetscBLASInt one = 1, m = (PetscBLASInt)t->m, lwork = 5 * m + 5 * 64 * m;
-  PetscReal *value, *work, tol = RANK_TOL;
+  PetscReal *value, *work, tol = HYCO_RANK;
   PetscBLASInt rank;
 
   PetscFunctionBegin;
@@ -523,7 +528,7 @@ static PetscErrorCode SemismoothStepUpdate(HycoConeStep *t, PetscBool *regular)
     most = PetscMax(most, PetscAbsReal(t->S[k * (c + 1)]));
   }
   /* A small pivot: the update loses digits, and a new base is taken. */
-  *regular = t->updated = (PetscBool)(info == 0 && least >= SINGULAR * PetscMax(most, 1));
+  *regular = t->updated = (PetscBool)(info == 0 && least >= NEARLY_SINGULAR * PetscMax(most, 1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -7,13 +7,23 @@
 #include <hycolcp.h>
 #include <petscblaslapack.h>
 
-#define NEAR      1e-7  /* forces and gaps below this share of the largest are near zero */
-#define PRESSES   1e-10 /* share of the gaps that a force moves by its own flexibility: less is round-off */
-#define DEPENDENT 1e-10 /* share of its flexibility that a contact has left, if its row depends on closed ones */
-#define NOTHING   1e-9  /* share of its terms below which the change of a gap is round-off */
-#define REGULAR   1e-14 /* smallest pivot over the largest of the scaled matrix */
-#define FREE      1e-9  /* share of a motion's largest entry of all contacts: less in those of the set is round-off */
-#define PUSHES    1e-11 /* share of the largest force: more is none of round-off */
+/* Of the largest gap, what a force moves by its own flexibility: 4.5e5 eps of the terms of a gap; a smaller force may
+   be the round-off of gaps (tests/fom/gradients.py, a floating body just above the load 0). */
+#define OWN_GAP 1e-10
+/* Of a contact's flexibility, what closed contacts leave of it: 100 times HYCO_DEPENDENT, as each product with the
+   inverse loses two digits. */
+#define DEPENDENT_ROW 1e-10
+/* Of its terms, the change of a gap: what is left of 16 digits after a factor of condition 1e7. */
+#define GAP_RATE_ROUND_OFF 1e-9
+/* Of the largest pivot of the scaled matrix, the least one: 45 eps, as the entries of the scaled matrix are at most 1.
+   */
+#define REGULAR 1e-14
+/* Of a motion's largest entry of all contacts, those of the set: less is the round-off of normals
+   (tests/fom/gradients.py, bodies barely held). */
+#define FREE_ENTRY 1e-9
+/* Of the largest force: 45,000 eps, ten times HELD of least_motion.c; where closed contacts do not determine the
+   solution, a force above it closes its own (tests/fom/gradients.py, bodies barely held). */
+#define SMALL_CLOSES 1e-11
 
 struct _n_HycoTangent {
   PetscInt p, n;             /* unknowns x; contacts */
@@ -50,9 +60,9 @@ static void TangentStates(PetscInt p, PetscInt n, const PetscReal M[], const Pet
     const PetscReal flexibility = M[(size_t)(p + i) * (size_t)(p + n) + (size_t)(p + i)];
     /* A contact whose own row is flexible must press noticeably: otherwise it may open for a small change. */
     const PetscBool closed =
-        (PetscBool)(L[i] > NEAR * most && (flexibility <= 0 || L[i] * flexibility > PRESSES * size));
+        (PetscBool)(L[i] > HYCO_UNDECIDED * most && (flexibility <= 0 || L[i] * flexibility > OWN_GAP * size));
 
-    state[i] = closed ? CLOSED : w[i] <= NEAR * size ? UNDECIDED : OPEN;
+    state[i] = closed ? CLOSED : w[i] <= HYCO_UNDECIDED * size ? UNDECIDED : OPEN;
   }
 }
 
@@ -65,7 +75,7 @@ static PetscBool CloseMore(PetscInt n, const PetscReal L[], PetscInt state[])
 
   for (PetscInt i = 0; i < n; i++) most = PetscMax(most, L[i]);
   for (PetscInt i = 0; i < n; i++) {
-    if (state[i] != UNDECIDED || !(L[i] > PUSHES * most)) continue;
+    if (state[i] != UNDECIDED || !(L[i] > SMALL_CLOSES * most)) continue;
     state[i] = CLOSED;
     more = PETSC_TRUE;
   }
@@ -75,7 +85,7 @@ static PetscBool CloseMore(PetscInt n, const PetscReal L[], PetscInt state[])
 /* A looser question than the state: contacts for which it is false need no row of the derivative. */
 PetscBool HycoTangentMayClose(PetscReal L, PetscReal w, PetscReal size)
 {
-  return (PetscBool)(L > 0 || w <= NEAR * size);
+  return (PetscBool)(L > 0 || w <= HYCO_UNDECIDED * size);
 }
 
 /* Whether no contact of the set acts on x[j], unlike others. */
@@ -87,7 +97,7 @@ static PetscBool IsFree(HycoTangent t, PetscBool rigid, const PetscReal M[], Pet
 
   for (size_t i = (size_t)first; i < n; i++) all = PetscMax(all, PetscAbsReal(M[i * n + (size_t)j]));
   for (PetscInt i = first; i < t->n_set; i++) set = PetscMax(set, PetscAbsReal(M[(size_t)t->set[i] * n + (size_t)j]));
-  return (PetscBool)(set <= FREE * all);
+  return (PetscBool)(set <= FREE_ENTRY * all);
 }
 
 /* The columns of M of the set, scaled to entries of order 1: the rows of x and of contacts have different units. */
@@ -178,7 +188,7 @@ static PetscErrorCode TangentCondense(HycoTangent t, const PetscReal M[])
     for (size_t i = 0; i < m; i++) left -= out[i] * into[i];
     for (size_t i = 0; i < m; i++) size += PetscAbsReal(out[i] * into[i]);
     /* A dropped contact's columns are overwritten by the next one's: into and out hold the kept ones, contiguous. */
-    if (left > DEPENDENT * size) t->open[kept++] = t->open[k];
+    if (left > DEPENDENT_ROW * size) t->open[kept++] = t->open[k];
   }
   t->n_open = kept;
   for (PetscInt j = 0; j < kept; j++) {
@@ -259,7 +269,7 @@ static void TangentGaps(HycoTangent t, const PetscReal q[], int sign, PetscReal 
       size += PetscAbsReal(out[i] * t->v[i]);
     }
     /* A sum of terms that cancel: 0, and no kink. */
-    if (PetscAbsReal(change[k]) <= NOTHING * size) change[k] = 0;
+    if (PetscAbsReal(change[k]) <= GAP_RATE_ROUND_OFF * size) change[k] = 0;
     *kink = (PetscBool)(*kink || change[k] != 0);
   }
 }

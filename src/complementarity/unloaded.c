@@ -7,7 +7,9 @@
 #include <hycoalgorithms.h>
 #include <hycolcp.h>
 
-#define APART 1e-8 /* residual of that problem, whose right-hand side is 1: below, no motion opens all contacts */
+/* Of the right-hand side 1 of the least squares, their residual: it is 0 but for its square root of eps, or no motion
+   opens all contacts. */
+#define OPENS_ALL 1e-8
 
 /* G d >= -w, |d| least: with E = (G, -w)^T and u >= 0 of least |E u - e|, e = (0, 1), d = -r / r_last for r = E u -
    e. */
@@ -24,7 +26,7 @@ static PetscErrorCode LeastDistance(PetscInt p, PetscInt n, const PetscReal E[],
   for (PetscInt k = 0; k < n; k++) {
     for (PetscInt i = 0; i <= p; i++) r[i] += u[k] * E[k * (p + 1) + i];
   }
-  *exists = (PetscBool)(residual > APART && r[p] < 0);
+  *exists = (PetscBool)(residual > OPENS_ALL && r[p] < 0);
   for (PetscInt i = 0; i < p && *exists; i++) d[i] = -r[i] / r[p];
   PetscCall(PetscFree(u));
   PetscCall(PetscFree2(e, r));

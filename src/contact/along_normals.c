@@ -5,7 +5,8 @@
 #include "nearest.h"
 #include <hycovector.h>
 
-/* Squared length of the mean of two reversed unit normals: a shorter one gives no direction. */
+/* Squared length of the mean of two reversed unit normals, below which it gives no direction: normals that differ by
+   more than 168 degrees. */
 #define NO_LINE 1e-2
 
 /* The search along a line for each point, and the best so far: squared distances from the line and from x, patch (-1:

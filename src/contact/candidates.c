@@ -9,12 +9,10 @@
 #include "master_search.h"
 #include <hycovector.h>
 
-/* Share of the coordinates' size: more than the round-off of a distance. */
-#define ROUND_OFF 1e-12
-#define LEVELS    6
-#define BLOCKS    (1 << LEVELS)    /* leaves of a rank's tree */
-#define BOXES     (2 * BLOCKS - 1) /* its children of box b are 2 b + 1 and 2 b + 2 */
-#define SAMPLES   256              /* nodes of the master that give the bound, of each rank */
+#define LEVELS  6
+#define BLOCKS  (1 << LEVELS)    /* leaves of a rank's tree */
+#define BOXES   (2 * BLOCKS - 1) /* its children of box b are 2 b + 1 and 2 b + 2 */
+#define SAMPLES 256              /* nodes of the master that give the bound, of each rank */
 
 /* A box of a tree; without slaves it has lo > hi. reach: how far a facet with their nearest points may be. */
 typedef struct {
@@ -147,7 +145,8 @@ static PetscErrorCode FindReach(Candidates *s)
     Box *box = &s->tree[b], *child;
 
     if (IsEmpty(box)) continue;
-    box->reach = s->stretch * reach[b] + s->margin + ROUND_OFF * (HycoLength(box->lo) + HycoLength(box->hi));
+    box->reach =
+        s->stretch * reach[b] + s->margin + HYCO_LENGTH_ROUND_OFF * (HycoLength(box->lo) + HycoLength(box->hi));
     if (place >= BLOCKS - 1) continue;
     /* Its tree begins at b - place, where child 2 place + 1 lies place + 1 behind the box. */
     child = box + place + 1; /* 2 place + 1 in its tree */
@@ -240,7 +239,7 @@ static PetscErrorCode FindMargin(Candidates *s, PetscBool integrated, PetscReal 
   /* The widest facet may be on another rank: every rank must search as far. */
   HycoAllreduce(most, 2, MPIU_REAL, MPI_MAX, s->comm);
   /* Round-off grows with the distance from the origin, not with the size of a facet. */
-  s->margin = (2 * HYCO_SAME_POINT + slack) * most[0] + ROUND_OFF * most[1];
+  s->margin = (2 * HYCO_SAME_POINT + slack) * most[0] + HYCO_LENGTH_ROUND_OFF * most[1];
   s->stretch = 1;
   if (integrated) PetscCall(WidenMargin(s));
   PetscFunctionReturn(PETSC_SUCCESS);

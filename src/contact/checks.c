@@ -2,12 +2,13 @@
 #include "surface_normals.h"
 #include <hycovector.h>
 
-/* Share of a slave's facet: largest overlap of surfaces before any load. */
+/* Of the slave's facet, the largest overlap before any load: half, beyond which the nearest facet may be one of the
+   body's other side. */
 #define HYCO_OVERLAP_SHARE 0.5
 
-/* The cosine of 84 degrees: a given normal at a larger angle to its surface's outward one is along the surface, or into
-   the body. Surfaces that face each other are within 72 degrees. */
-#define ALONG 0.1
+/* Cosine of the angle between a given normal and the surface's outward one, below which it is refused: 84 degrees,
+   while surfaces that face each other are within 72. */
+#define ALONG_SURFACE 0.1
 
 /* The size of facets around a node, of one surface at a time: the slave's or the master's of a contact of the scene. */
 typedef struct {
@@ -50,7 +51,7 @@ static PetscErrorCode AllowedOverlap(HycoFE fe, const HycoPairs *p, PetscInt k, 
     PetscCall(SizeAt(fe, c->slave, p->slave[k], sizes, &size));
     *allowed = size > 0 ? HYCO_OVERLAP_SHARE * size : PETSC_MAX_REAL;
   }
-  *deep = (PetscBool)(-gap > *allowed + HYCO_ROUNDING * HycoMeshLength(fe->mesh));
+  *deep = (PetscBool)(-gap > *allowed + HYCO_LENGTH_ROUND_OFF * HycoMeshLength(fe->mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -152,9 +153,9 @@ PetscErrorCode HycoContactCheckNormals(MPI_Comm comm, HycoFE fe, const HycoPairs
   HycoAllreduce(worst, 2 * s->n_contacts, MPIU_REAL, MPI_MIN, comm);
   for (PetscInt c = 0; c < s->n_contacts; c++) {
     const PetscReal cosine = PetscMin(worst[2 * c], -worst[2 * c + 1]);
-    const PetscBool into = (PetscBool)(cosine < -ALONG);
+    const PetscBool into = (PetscBool)(cosine < -ALONG_SURFACE);
 
-    if (cosine >= ALONG || worst[2 * c + 1] == 2) continue;
+    if (cosine >= ALONG_SURFACE || worst[2 * c + 1] == 2) continue;
     PetscCall(PetscFree(worst));
     HycoFail("contact %s: its normal points %s %s; give one that points out of the slave's body, or none, and the "
              "surface's own is taken",
@@ -223,7 +224,7 @@ PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u
       ierr = FacetAt(fe, pairs, k, sizes, &size);
     if (!ierr && size > 0) state->sliding = PetscMax(state->sliding, HycoTangentialLength(r, normal + 3 * k) / size);
   }
-  if (state->overlap <= HYCO_ROUNDING * HycoMeshLength(fe->mesh)) state->overlap = 0;
+  if (state->overlap <= HYCO_LENGTH_ROUND_OFF * HycoMeshLength(fe->mesh)) state->overlap = 0;
   PetscCall(PetscFree2(normal, gap));
   HycoFreeAll(&sizes[0].size, &sizes[1].size);
   PetscCall(ierr);

@@ -7,10 +7,10 @@
 #include <hycofe.h>
 #include <hycovector.h>
 
-/* A step of this size in the reference facet is round-off. */
-#define SMALL_STEP 1e-15
-/* A larger squared distance by this factor is round-off. */
-#define EQUAL (1 + 1e-12)
+#define SMALL_STEP 1e-15 /* of the reference facet, whose size is 1: 4.5 eps, a step's round-off */
+/* Factor of the squared distance up to which a step brings no farther: 1 and 4500 eps, the shape functions' round-off.
+   */
+#define NO_FARTHER (1 + 1e-12)
 /* Steps that end farther outside the reference facet do not return into it. */
 #define FAR_OUTSIDE 3
 
@@ -66,7 +66,7 @@ static PetscReal CurvedFacetDescend(const HycoCurved *f, const PetscReal x[3], P
       for (PetscInt k = 0; k < 2; k++) trial[k] = at[k] + step[k];
       if (f->corners == 2) trial[0] = PetscMin(PetscMax(trial[0], -1), 1);
       next = CurvedFacetEvaluate(f, x, trial, r, tangent, w);
-      if (next <= EQUAL * best) break;
+      if (next <= NO_FARTHER * best) break;
       for (PetscInt k = 0; k < 2; k++) step[k] /= 2;
     }
     if (!(length > SMALL_STEP) || (trial[0] == at[0] && trial[1] == at[1])) break;

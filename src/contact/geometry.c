@@ -1,14 +1,12 @@
 /* Normals and gaps of the potential contacts at the current parameters. */
 #include "surface_normals.h"
+#include "nearest.h"
 #include <hycokinematics.h>
 #include <hycovector.h>
 
-/* Share of the mesh's length: the round-off of a mean of positions. */
-#define ROUND_OFF 1e-14
-
 PetscReal HycoContactTouches(HycoFE fe)
 {
-  return ROUND_OFF * HycoMeshLength(fe->mesh);
+  return HYCO_POSITION_ROUND_OFF * HycoMeshLength(fe->mesh);
 }
 
 /* Removes from a normal the directions of released rigid motions at the contact, so that the discretisation of a

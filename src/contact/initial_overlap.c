@@ -1,9 +1,9 @@
 /* Given gaps whose sign is probably wrong: a contact that overlaps everywhere, and deeply. */
 #include "surface_normals.h"
 
-/* Share of a body's extent. Parts are fitted with interferences of 0.05 to 0.3 % of their diameter, and metals yield
-   beyond; an overlap of 1 % at every node is hardly meant, while a clearance of this size is common. */
-#define OVERLAP_SHARE 0.01
+/* Of a body's extent, an overlap at every node: parts are fitted with interferences of 0.05 to 0.3 % of their diameter,
+   and metals yield beyond; 1 % is hardly meant, while a clearance of this size is common. */
+#define LARGE_OVERLAP 0.01
 
 /* The extents of the bodies (the diagonals of their boxes) at the present positions, over all ranks. */
 static PetscErrorCode OverlapBodySizes(MPI_Comm comm, HycoFE fe, PetscReal extent[])
@@ -73,7 +73,7 @@ PetscErrorCode HycoContactInitialOverlap(MPI_Comm comm, HycoFE fe, HycoFE surfac
     const PetscReal *of = most + 2 * c;
 
     if (!s->contact[c]->gap || s->contact[c]->ops->gap || of[0] == -PETSC_MAX_REAL || !(of[1] < 0)) continue;
-    if (of[0] < OVERLAP_SHARE * of[1]) share[c] = of[0] / of[1];
+    if (of[0] < LARGE_OVERLAP * of[1]) share[c] = of[0] / of[1];
   }
   PetscCall(PetscFree2(extent, most));
   PetscFunctionReturn(PETSC_SUCCESS);

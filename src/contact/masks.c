@@ -7,10 +7,11 @@
 #include "master_search.h"
 #include <hycokinematics.h>
 
-/* How near to a facet's nodes it is tested, as a share of their distance from its middle; a distance that is
-   round-off. */
-#define NEAR  0.9
-#define SMALL 1e-3
+/* Place on the line from a facet's middle to a node at which it is tested: near the node, but inside. */
+#define NEAR_NODE 0.9
+/* Distance of a tested point from its facet as a share of the facet's radius: above the round-off of the ray, below any
+   gap that is drawn. */
+#define LIFTED 1e-3
 
 /* The contacts of one run at the slaves, chained by node: the facets that count, and how many do not. */
 typedef struct {
@@ -58,8 +59,8 @@ static PetscErrorCode FacetLooks(HycoMasterSearch *t, PetscInt f, PetscReal x[3]
   for (PetscInt a = -1; a < m->nf && !*looks && HycoDot(out, out) > 0; a++) {
     const PetscReal *end = a < 0 ? middle : t->fe->X + 3 * node[a];
 
-    for (PetscInt c = 0; c < 3; c++) x[c] = middle[c] + NEAR * (end[c] - middle[c]);
-    PetscCall(PointLooks(t, SMALL * HycoDistance(middle, t->fe->X + 3 * node[0]), out, looks));
+    for (PetscInt c = 0; c < 3; c++) x[c] = middle[c] + NEAR_NODE * (end[c] - middle[c]);
+    PetscCall(PointLooks(t, LIFTED * HycoDistance(middle, t->fe->X + 3 * node[0]), out, looks));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -5,8 +5,8 @@
 #include <stdlib.h>
 
 /* -- begin: in exported models too -- */
-/* How far past the border a slave node may be, as a share of the facet's shortest edge: its master is then a point
-   of the border. */
+/* Distance past the border of a surface as a share of the facet's shortest edge, up to which a slave's master is a
+   point of the border: meshes of one arc by chords differ by less (tests/contact/pairing.py). */
 #define HYCO_PAST_BORDER 0.1
 /* -- end: in exported models too -- */
 

@@ -6,7 +6,7 @@
 #include <hycovector.h>
 
 /* -- begin: in exported models too -- */
-/* Share of a facet's shortest edge: points at a smaller distance coincide. */
+/* Of a facet's shortest edge: points that are nearer coincide; mesh files have 6 digits at least. */
 #define HYCO_SAME_POINT 1e-6
 
 typedef struct {

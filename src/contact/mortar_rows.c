@@ -12,16 +12,19 @@
 #include <hycokinematics.h>
 #include <petscblaslapack.h>
 
-/* Shares of a facet's area: smaller parts are round-off; on smaller facing parts a facet's dual functions would be
-   ill-conditioned, and its own functions are used (first order), or none (second order). */
-#define ROUND_OFF  1e-12
-#define SLIVER     1e-3
+#define EMPTY_PIECE 1e-12 /* of a facet's area: 4500 eps, the clipping of two polygons */
+/* Of a facet's area, the part that faces: on a smaller one dual functions have a condition above 1e3, and first order
+   uses its own functions (tests/contact/mortar.py). */
+#define SLIVER 1e-3
+/* Of a second-order facet's area, the part that faces: on a smaller one it has no functions, because its own are
+   negative in parts (tests/contact/mortar.py). */
 #define SLIVER_TWO 5e-2
-/* A facet that faces more than this share of itself faces two layers of the master. */
-#define TWICE 1.05
-/* Weights below are round-off. */
-#define SNAP 1e-14
-/* Pivots over a facet's radius below which its nodes do not determine a linear function. */
+/* Of a facet's area, the parts that face: above 1 by more than the curvature of a surface gives, it faces two layers of
+   the master. */
+#define TWO_LAYERS 1.05
+#define SNAP       1e-14 /* of 1, a weight of a row: 45 eps of the largest */
+/* Of a facet's radius, a pivot: its nodes lie nearly on one line, and do not determine a linear function to three
+   digits. */
 #define UNDETERMINED 1e-3
 
 /* The integrals of a slave's facet with one facet of the master. */
@@ -164,7 +167,7 @@ static PetscErrorCode AddPiece(Mortar *s, const HycoPlane *plane, const HycoSide
   HycoSideSet(plane, s->t.nf, s->corners, s->t.node + patch * s->t.nf, s->t.X, &master);
   HycoPieceCut(plane->dim, slave, &master, &piece);
   /* The nearer of two layers is kept by the limit on the height, and slivers of round-off would only add masters. */
-  if (!(piece.size > ROUND_OFF * s->size)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!(piece.size > EMPTY_PIECE * s->size)) PetscFunctionReturn(PETSC_SUCCESS);
   height = MortarRowHeight(slave, &master, &piece);
   if (PetscAbsReal(height) > limit || (s->front && height < -HYCO_SAME_POINT * plane->radius))
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -259,7 +262,7 @@ static PetscErrorCode FindPieces(Mortar *s, PetscInt f, HycoSide *slave)
     PetscCall(AddPieces(s, plane, slave, limit));
     /* Counted twice, the slave's area faces more than itself: a second layer lies behind the first. */
     limit /= 2;
-  } while (s->facing > TWICE * s->size && limit > ROUND_OFF * plane->radius);
+  } while (s->facing > TWO_LAYERS * s->size && limit > EMPTY_PIECE * plane->radius);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -7,10 +7,7 @@
 #include <hycovector.h>
 
 /* -- begin: in exported models too -- */
-/* A smaller weight is round-off of a projection onto an edge or a node. */
-#define SNAP 1e-12
-/* Share of the coordinates' size: more than the round-off of a distance. */
-#define ROUND_OFF 1e-14
+#define SNAP_WEIGHT 1e-12 /* of 1, a weight of a master: 4500 eps, a projection onto an edge or a node */
 
 /* Whether p comes before q along an axis. Equal coordinates are ordered by index: the tree is the same on any number
    of ranks. */
@@ -389,7 +386,7 @@ void HycoPatchesProject(HycoPatches s, const PetscReal x[3], const PetscReal aga
   PetscReal sum = 0;
   PetscInt patch;
 
-  q.round_off = ROUND_OFF * (LargestCoordinate(s->box[0].lo, s->box[0].hi) + LargestCoordinate(x, x));
+  q.round_off = HYCO_POSITION_ROUND_OFF * (LargestCoordinate(s->box[0].lo, s->box[0].hi) + LargestCoordinate(x, x));
   SetBest(&q, PETSC_MAX_REAL, 0, none);
   NearestSearch(s, 0, 0, s->n, &q);
   patch = q.patch;
@@ -402,7 +399,7 @@ void HycoPatchesProject(HycoPatches s, const PetscReal x[3], const PetscReal aga
 
     /* A projection onto an edge or a node must have only its nodes as masters: HycoMasterSearchAtBorder() reads the
        number. */
-    if (PetscAbsReal(w[a]) < SNAP) continue;
+    if (PetscAbsReal(w[a]) < SNAP_WEIGHT) continue;
     for (; at > 0 && p->node[at - 1] > s->node[patch * s->nf + a]; at--) {
       p->node[at] = p->node[at - 1];
       p->weight[at] = p->weight[at - 1];

@@ -11,8 +11,12 @@ typedef struct {
   PetscReal weight[HYCO_FACET_NODES], distance;
 } HycoProjection;
 
-/* Normals oppose each other if their product is at most this (within 72 degrees). */
+/* Product of two normals up to which they oppose each other: within 72 degrees, as conforming surfaces round an edge of
+   a coarse mesh do (tests/contact/pairing.py). */
 #define HYCO_OPPOSED -0.3
+
+/* Of the coordinates' size, or the mesh's length: 45 eps, a mean of positions or a distance. */
+#define HYCO_POSITION_ROUND_OFF 1e-14
 
 /* A point with a number, which orders points of equal coordinates. */
 typedef struct {

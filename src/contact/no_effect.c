@@ -30,7 +30,7 @@ PetscErrorCode HycoContactCheckStill(HycoFE fe, const HycoPairs *pairs, PetscInt
 
     size = PetscMax(size, EffectLargest(fe->X + 3 * i, 3) + EffectLargest(fe->u0 + i * dim, dim));
   }
-  HycoCheck(*left >= -HYCO_ROUNDING * size,
+  HycoCheck(*left >= -HYCO_LENGTH_ROUND_OFF * size,
             "contact %s: node %d is fixed%s, and its prescribed displacement penetrates by %g, so that no solution "
             "exists; change the support or the gap",
             fe->scene->contact[pairs->contact[k]]->name, (int)fe->mesh->node_id[slave],

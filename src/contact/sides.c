@@ -9,8 +9,9 @@
 #include <hycovector.h>
 #include <stdlib.h>
 
-/* The cosine of 40 degrees: facets at a larger angle at a node are on two sides, unless others lie between them. */
-#define EDGE 0.766
+/* Cosine of the angle of two facets, below which they are on two sides: 40 degrees, more than between facets of a
+   smooth surface with nine on a circle. */
+#define EDGE_COSINE 0.766
 
 /* The facets around a node, as places f * nf + a of facets[], of one group. */
 typedef struct {
@@ -67,7 +68,8 @@ static PetscErrorCode FollowChain(Star *s, PetscInt k, PetscInt side, PetscInt *
     const PetscInt other = s->place[i];
     PetscBool before;
 
-    if (s->side[other] != HYCO_ONE_SIDE || HycoDot(s->normal + 3 * s->place[k], s->normal + 3 * other) < EDGE) continue;
+    if (s->side[other] != HYCO_ONE_SIDE || HycoDot(s->normal + 3 * s->place[k], s->normal + 3 * other) < EDGE_COSINE)
+      continue;
     PetscCall(SidesPrecedes(s->m, other, *first, &before));
     if (before) *first = other;
     PetscCall(FollowChain(s, i, side, first));

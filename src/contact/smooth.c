@@ -8,10 +8,10 @@
 #include <hycokinematics.h>
 #include <hycovector.h>
 
-/* Facets at a larger angle (40 degrees) form an edge of the body, not a curved surface. */
-#define EDGE 0.7
-/* Deviation of a plane due to the rounding of coordinates in a mesh file. */
-#define FLAT 1e-6
+/* Cosine of the angle of two facets, below which they form an edge of the body: 46 degrees, as between the eight facets
+   of a circle; others are a curved surface. */
+#define BEND_COSINE 0.7
+#define FLAT        1e-6 /* deviation of a plane's normals: coordinates in a mesh file have 6 digits at least */
 
 /* Whether place k of the facets counts at its node. */
 static PetscBool SmoothNormalCounts(HycoMesh m, const PetscInt side[], PetscInt k)
@@ -127,7 +127,7 @@ static PetscErrorCode FindBends(HycoFE fe, PetscInt group, Surface *s, PetscReal
     for (PetscInt v = 0; v < m->nf; v++) {
       const PetscReal bend = s->bend[m->facets[f * m->nf + v]];
 
-      if (bend < EDGE) most = PetscMax(most, bend);
+      if (bend < BEND_COSINE) most = PetscMax(most, bend);
     }
     for (PetscInt v = 0; v < m->nf; v++) {
       if (SmoothNormalCounts(m, s->side, f * m->nf + v))
@@ -164,7 +164,7 @@ PetscErrorCode HycoSmoothNormals(HycoFE fe, PetscInt group, const PetscInt side[
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     doubt[i] = FLAT;
     /* On an edge of the body each facet is its own surface: there is no smooth normal to be in doubt about. */
-    if (s.bend[i] >= EDGE) continue;
+    if (s.bend[i] >= BEND_COSINE) continue;
     if (s.fan[i] || HycoMeshIsQuadratic(m))
       doubt[i] += bend[i];
     else

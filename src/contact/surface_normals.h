@@ -3,9 +3,6 @@
 #define HYCO_SURFACE_NORMALS_H
 #include <hycocontactimpl.h>
 
-/* Share of the mesh's length: a smaller overlap is round-off. */
-#define HYCO_ROUNDING 1e-12
-
 /* Sum of n dS over the facets of `group` around each node (n_nodes x 3), of which the direction matters. */
 PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[]);
 /* The same, scaled to unit length; 0 if a node has no facet. */

@@ -10,11 +10,13 @@
 #include <hycokinematics.h>
 #include <hycomaterialimpl.h>
 
-#define BATCH    16 /* cells of one body whose points a law evaluates together */
-#define VIRGIN   -1 /* temperature of a point before its first step */
-#define N_PLAIN  4
-#define LARGE    0.3 /* displacements under which laws are asked whether they yield, as a share of the mesh's length */
-#define ROUNDING 256 /* units of round-off in what a stress loses */
+#define BATCH   16 /* cells of one body whose points a law evaluates together */
+#define VIRGIN  -1 /* temperature of a point before its first step */
+#define N_PLAIN 4
+/* Displacements as a share of the mesh's length, at which laws are tried for whether they yield: above any small
+   displacement. */
+#define LARGE_DISPLACEMENT 0.3
+#define ROUNDING           256 /* units of round-off in what a stress loses */
 
 struct _n_HycoFEState {
   PetscInt n_cells, *start; /* n_cells + 1 */
@@ -769,7 +771,7 @@ PetscErrorCode HycoFERates(HycoFE fe, const PetscReal u[], PetscReal t, PetscRea
 /* In no time creep does nothing: what deforms or fails now yields. */
 PetscErrorCode HycoFEYields(HycoFE fe, PetscReal t, PetscBool *yields)
 {
-  const PetscReal size = LARGE * HycoMeshLength(fe->mesh);
+  const PetscReal size = LARGE_DISPLACEMENT * HycoMeshLength(fe->mesh);
   HycoFEStepReport report;
   HycoFEState begin, end;
   PetscReal *u, *f;

@@ -11,10 +11,11 @@
 #include <hycokinematics.h>
 #include <hycovector.h>
 
-/* Length of n that remains after elimination of other supports at the node, relative to n: zero; too small to
-   distinguish two planes. */
-#define NOTHING  1e-9
-#define PARALLEL 1e-2
+/* Of a normal's length, what other supports at the node leave: 4.5e6 eps; the supports say the same. */
+#define ELIMINATED 1e-9
+/* Of a normal's length, what other supports at the node leave: two planes at less than 0.6 degrees are refused, since
+   their line moves by 100 times the error of either. */
+#define NEARLY_PARALLEL 1e-2
 
 /* The room stays for the next parameters. */
 void HycoObliqueClear(HycoFE fe)
@@ -76,11 +77,11 @@ PetscErrorCode HycoObliqueAdd(HycoFE fe, PetscInt support, PetscInt node, const 
     c = d;
   }
   /* The direction depends on supports before: it must ask for the same value. */
-  if (best <= NOTHING) {
+  if (best <= ELIMINATED) {
     PetscCall(CheckSame(fe, node, n, v, PetscAbsReal(value), key));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  HycoCheck(best > PARALLEL,
+  HycoCheck(best > NEARLY_PARALLEL,
             "%s: at node %d its direction is nearly parallel to that of another support; give both the same direction",
             key, (int)fe->mesh->node_id[node]);
   HycoGrow(fe->n_oblique, fe->room_oblique, fe->oblique);

@@ -8,7 +8,8 @@
 
 /* A density in kg/m^3 where the stresses are in MPa is too large by 1e12, and strains under weight are about 1e-6. */
 #define HYCO_MOST 1e6
-/* Of the energies, which are computed from stresses, loads and contact forces. Solutions have 1e-9 and less. */
+/* Of the energies, from stresses, loads and contact forces: solutions have 1e-9 and less; more is an error of the model
+   or an unconverged solve. */
 #define HYCO_MOST_DEFECT 1e-3
 
 /* The largest displacement relative to the mesh's longest side, or to the largest prescribed displacement if that is

@@ -2,15 +2,16 @@
 #include <hycogradient.h>
 #include <hycopath.h>
 
-#define KINK 1e-3 /* share of a slope by which those to the two sides differ, if it is no curvature */
-#define STAYS                                                                                                          \
-  0.5 /* share of that difference which remains at a quarter of the step, where curvature leaves a quarter */
-#define ROUND 1e-9 /* share of a value below which a difference may be round-off */
-#define NOISE                                                                                                          \
-  3e-13 /* share of a value below which its change over a step is round-off: as a derivative 1e-8 of it over the
-           range */
-#define NOTHING                                                                                                        \
-  1e-8 /* share of the largest value on a path below which one is round-off, as is a change over the range */
+/* Share of a jump that remains at a quarter of the step: a kink keeps all of it, curvature a quarter. */
+#define JUMP_STAYS 0.5
+/* Of a value, its difference over a step: ten times the residual of solves, 1e-10 as a rule. */
+#define DIFFERENCE_ROUND_OFF 1e-9
+/* Of a value, its change over a step of HYCO_GRADIENT_STEP: 1350 eps; as a derivative 1e-8 of the value over the range.
+   */
+#define DERIVATIVE_ROUND_OFF 3e-13
+/* Of an output's largest value on a path: the residual of the forces, 1e-8; less is round-off, as is a change over the
+   range. */
+#define NO_OUTPUT 1e-8
 
 /* For gradients at full order and of models. */
 PetscErrorCode HycoGradientCheckScene(HycoScene s)
@@ -80,7 +81,7 @@ PetscReal HycoDifferenceJump(const HycoDifference *d, PetscReal size, PetscReal 
   DifferenceQuotients(d, v, s);
   jump = PetscAbsReal(s[0] - s[1]);
   if (slope <= 0) slope = PetscMax(PetscAbsReal(s[0]), PetscAbsReal(s[1]));
-  return jump > KINK * slope && jump * PetscAbsReal(d->step[1]) > ROUND * size ? jump : 0;
+  return jump > HYCO_KINK * slope && jump * PetscAbsReal(d->step[1]) > DIFFERENCE_ROUND_OFF * size ? jump : 0;
 }
 
 /* closer: at mu, and at the two points of the shrunk difference. */
@@ -91,7 +92,7 @@ PetscBool HycoDifferenceKinks(const HycoDifference *d, PetscReal jump, const Pet
 
   HycoDifferenceShrink(&near);
   DifferenceQuotients(&near, closer, s);
-  return (PetscBool)(jump > 0 && PetscAbsReal(s[0] - s[1]) > STAYS * jump);
+  return (PetscBool)(jump > 0 && PetscAbsReal(s[0] - s[1]) > JUMP_STAYS * jump);
 }
 
 /* The store owns the arrays, which g borrows: a former gradient of the same object becomes invalid. */
@@ -147,7 +148,8 @@ static void DifferencesSet(HycoGradient *g, HycoGradientStore *store, const Hyco
   store->value[at] = 0;
   for (PetscInt k = 0; k < 3; k++) store->value[at] += side.weight[k] * value[k * g->n_outputs + q];
   /* Below the noise of the difference: a derivative that is exactly 0 has round-off of any sign. */
-  if (PetscAbsReal(store->value[at] * d->step[1]) <= NOISE * PetscAbsReal(value[q])) store->value[at] = 0;
+  if (PetscAbsReal(store->value[at] * d->step[1]) <= DERIVATIVE_ROUND_OFF * PetscAbsReal(value[q]))
+    store->value[at] = 0;
   store->kink[at] = (PetscBool)(kink || turns);
 }
 
@@ -175,7 +177,7 @@ static void DropRounding(const HycoGradient *g, HycoGradientStore *store, HycoSc
 
   for (PetscInt q = 0; q < g->n_outputs; q++) {
     const PetscInt at = q * g->n_parameters + p;
-    const PetscReal least = NOTHING * store->most[q];
+    const PetscReal least = NO_OUTPUT * store->most[q];
 
     if (PetscAbsReal(value[q]) > least || PetscAbsReal(store->value[at]) * width > least) continue;
     store->value[at] = 0;
@@ -313,7 +315,7 @@ PetscErrorCode HycoGradientOfPath(HycoScene scene, const PetscReal mu[], const H
 /* Whether v is an extreme as `most` is, but for round-off. */
 static PetscBool DifferencesIsExtreme(const HycoQuantity *of, PetscReal v, PetscReal most)
 {
-  const PetscReal room = HYCO_GRADIENT_FORCE * PetscAbsReal(most);
+  const PetscReal room = HYCO_UNDECIDED * PetscAbsReal(most);
 
   return (PetscBool)(!HycoPathIsBeyond(of, most, v + room) || !HycoPathIsBeyond(of, most, v - room));
 }
@@ -344,7 +346,7 @@ static void SetExtreme(HycoScene scene, const HycoStep step[], const HycoDiffere
   store->kink[g->n_times * n + at] = store->kink[chosen * n + at];
   for (PetscInt k = 0; k < g->n_times; k++) {
     if (DifferencesIsExtreme(of, step[k].quantity[q], most) &&
-        PetscAbsReal(store->value[k * n + at] - store->value[chosen * n + at]) > KINK * slope)
+        PetscAbsReal(store->value[k * n + at] - store->value[chosen * n + at]) > HYCO_KINK * slope)
       store->kink[g->n_times * n + at] = PETSC_TRUE;
   }
 }

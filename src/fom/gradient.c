@@ -10,9 +10,9 @@
 */
 #include "sensitivity_step.h"
 
-#define CLOSED  1e-7 /* share of the largest gap below which one is closed */
-#define LAWS    2 /* quarters of the step with laws that flow, whose stresses at given strains are curved: eps^(1/3) */
-#define NOTHING 1e-8 /* share of the largest change of a gap below which it is round-off */
+/* Quarters of the step with laws that flow, whose stresses at given strains are curved: eps^(1/3). */
+#define LAWS      2
+#define NO_CHANGE 1e-8 /* of the largest change of a gap: the residual of the forces, 1e-8 */
 
 typedef struct {
   HycoFOM f;
@@ -220,14 +220,14 @@ static PetscErrorCode MasterChanges(Work *o, const HycoDifference *d, PetscBool 
   for (PetscInt j = 0; j < 5; j++) PetscCall(VecGetArrayRead(o->W[j], &w[j]));
   for (PetscInt k = 0; k < rows; k++) {
     /* The largest rate of all gaps is the scale of a jump: a gap that does not change has only round-off. */
-    if (L[k] > HYCO_GRADIENT_FORCE * most) slope = PetscMax(slope, PetscAbsReal((w[1][k] - w[0][k]) / d->step[1]));
+    if (L[k] > HYCO_UNDECIDED * most) slope = PetscMax(slope, PetscAbsReal((w[1][k] - w[0][k]) / d->step[1]));
   }
   HycoAllreduce(&slope, 1, MPIU_REAL, MPI_MAX, HycoComm(o->f));
   for (PetscInt k = 0; k < rows; k++) {
     const PetscReal v[3] = {w[0][k], w[1][k], w[2][k]}, near[3] = {w[0][k], w[3][k], w[4][k]};
     PetscReal jump;
 
-    if (L[k] <= HYCO_GRADIENT_FORCE * most) continue;
+    if (L[k] <= HYCO_UNDECIDED * most) continue;
     jump = HycoDifferenceJump(d, o->size, slope, v);
     *turns = (PetscBool)(*turns || (closer ? HycoDifferenceKinks(d, jump, near) : jump > 0));
   }
@@ -305,7 +305,7 @@ static PetscErrorCode GradientAtRest(Work *o)
   PetscCall(VecGetArrayRead(o->g, &g));
   o->regular = (PetscBool)(load == 0);
   for (PetscInt k = 0; k < rows; k++)
-    o->regular = (PetscBool)(o->regular && (w[k] > CLOSED * o->size || PetscAbsReal(g[k]) <= NOTHING * most));
+    o->regular = (PetscBool)(o->regular && (w[k] > HYCO_UNDECIDED * o->size || PetscAbsReal(g[k]) <= NO_CHANGE * most));
   PetscCall(VecRestoreArrayRead(o->g, &g));
   PetscCall(VecRestoreArrayRead(o->W[0], &w));
   HycoAllreduce(&o->regular, 1, HYCO_MPI_BOOL, MPI_LAND, HycoComm(o->f));

@@ -7,16 +7,25 @@
 #include <hycomaterialimpl.h>
 #include <stdlib.h>
 
-#define SLIDING_STEP 1e-6 /* of the whole time: the smallest step before a body slides away */
-#define GROWTH       1.5
-#define CREEPS       1e-12 /* a smaller inelastic strain of a whole path is round-off of elastic strains */
-/* The share of the tolerance that a step may have whose own strain is small: a hundredth of the strain of the interval.
-   Relaxation (n = 3 to 8, to a tenth of the stress) then takes 150 to 250 steps, and its strain is right to 0.4 %. */
-#define SHARE     0.01
-#define SHORT     1e-4 /* of a step: a time in which stresses do not change */
-#define LATE      1.3  /* times the length that the error permits: a longer step is tried again */
-#define AIM       0.8  /* times that length is the next step */
-#define LEAST_CUT 0.05 /* shortest step after one that was too long */
+/* Smallest step before a body slides away, as a share of the whole time: the time of sliding is then known to 6 digits
+   (tests/paths/history.py). */
+#define SLIDING_STEP 1e-6
+#define GROWTH       1.5 /* factor of a step after an easy one: two easy steps double it */
+/* Inelastic strain of a whole path: 4500 eps of a strain of 1, round-off of elastic strains; less has no error in time.
+   */
+#define CREEP_ROUND_OFF 1e-12
+/* Of an interval's strain, that by which the error of a step with less is judged: relaxation (n = 3 to 8, to a tenth of
+   the stress) takes 150 to 250 steps, and its strain is right to 0.4 %. */
+#define LEAST_STRAIN 0.01
+/* Time of the differences for a rate, as a share of a step: stresses do not change in it. */
+#define RATE_STEP 1e-4
+/* Step over the length that the error permits, above which it is repeated: a step of 1.3 has 1.7 times the error of
+   second order that it may have. */
+#define REPEAT_FROM 1.3
+/* Next step over the length that the error permits: the usual 0.8, as rejected steps cost more than short ones. */
+#define AIM 0.8
+/* Next step over the last that was too long, at least: an estimate far outside of its range does not decide more. */
+#define LEAST_CUT 0.05
 
 const char *const HycoNewtons[] = {"auto", "tangent", "elastic", "modified", NULL};
 
@@ -226,7 +235,7 @@ static PetscErrorCode FirstRates(HycoPath p, PetscReal h)
   for (PetscInt k = 0; k < 2 && !p->rate[k]; k++) PetscCall(PetscCalloc1(n + 1, &p->rate[k]));
   /* As after the step before where the path goes on from a checkpoint, so that its steps are the same. */
   if (!(p->rated_by > 0)) p->rated_by = h;
-  PetscCall((*p->ops->rates)(p, p->t, SHORT * p->rated_by, p->begin, p->rate[0], &p->largest));
+  PetscCall((*p->ops->rates)(p, p->t, RATE_STEP * p->rated_by, p->begin, p->rate[0], &p->largest));
   p->rated = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -239,7 +248,7 @@ static PetscErrorCode EstimateTime(HycoPath p, PetscReal h, PetscReal t1, TimeEr
   PetscReal most[2] = {0, 0}, permitted;
 
   PetscFunctionBegin;
-  PetscCall((*p->ops->rates)(p, t1, SHORT * h, p->end, p->rate[1], &e->largest));
+  PetscCall((*p->ops->rates)(p, t1, RATE_STEP * h, p->end, p->rate[1], &e->largest));
   for (PetscInt i = 0; i < n; i++) {
     const PetscReal strain = h * p->rate[1][i], change = h * PetscAbsReal(p->rate[1][i] - p->rate[0][i]) / 2;
 
@@ -249,10 +258,11 @@ static PetscErrorCode EstimateTime(HycoPath p, PetscReal h, PetscReal t1, TimeEr
   HycoAllreduce(most, 2, MPIU_REAL, MPI_MAX, p->comm);
   e->error = most[0];
   p->ahead = PetscMax(p->ahead, e->largest);
-  permitted = p->time_tol * PetscMax(most[1], SHARE * p->ahead);
+  permitted = p->time_tol * PetscMax(most[1], LEAST_STRAIN * p->ahead);
   /* Nor where the sum is small. */
   permitted = PetscMax(permitted, p->time_tol * p->ahead - p->time_error);
-  if (e->error > 0 && p->ahead > CREEPS && p->time_tol > 0 && !p->substeps) e->allowed = h * permitted / e->error;
+  if (e->error > 0 && p->ahead > CREEP_ROUND_OFF && p->time_tol > 0 && !p->substeps)
+    e->allowed = h * permitted / e->error;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -282,11 +292,11 @@ static PetscErrorCode TryStep(HycoPath p, PetscReal stop)
   PetscCall(FirstRates(p, h));
   PetscCall(HycoPathAttempt(p, p->t, t1, &a));
   if (a.converged && p->rates) PetscCall(EstimateTime(p, h, t1, &e));
-  if (a.converged && ((a.law.increment > p->bound && !p->given) || LATE * e.allowed < h)) {
+  if (a.converged && ((a.law.increment > p->bound && !p->given) || REPEAT_FROM * e.allowed < h)) {
     a.converged = PETSC_FALSE;
     /* A converged step is rejected for its accuracy: what it found is undone. */
     HycoFormat(a.why, "the increment of inelastic strain is %.1e in one step", (double)a.law.increment);
-    if (LATE * e.allowed < h) HycoFormat(a.why, "the error in time of one step is %.1e", (double)e.error);
+    if (REPEAT_FROM * e.allowed < h) HycoFormat(a.why, "the error in time of one step is %.1e", (double)e.error);
     PetscCall(HycoPathRestore(p));
   }
   HistoryCount(p, &a);
@@ -465,7 +475,7 @@ void HycoPathGetHistory(HycoPath p, HycoHistory *h)
   h->newton = HycoNewtons[HycoPathMethod(p)];
   h->factor_cost = HycoPathFactorCost(p);
   h->n_bound = p->n_bound;
-  h->time_error = p->largest > CREEPS ? p->time_error / p->largest : 0;
+  h->time_error = p->largest > CREEP_ROUND_OFF ? p->time_error / p->largest : 0;
   h->n_orders = p->n_orders;
   h->n_taken = p->n_taken;
   h->taken = p->taken;

@@ -12,12 +12,17 @@
 */
 #include <hycopath.h>
 
+/* Decrease of the potential as a share of its slope, at which a step is taken: the usual 1e-4 (Nocedal, Wright,
+   Numerical Optimization, 3.1). */
 #define ARMIJO    1e-4
-#define SHORTENED 8     /* largest number of halvings of a step */
-#define WORTH     8     /* expected number of further iterations above which a new tangent is made (modified) */
-#define FEW       5     /* iterations of a step of elastic bodies with friction, beyond which only round-off is left */
-#define NOTHING   1e-14 /* loads relative to K U: round-off */
-#define FORCING   1e-3  /* residual of a solve without a factor, as a share of that of the iterate */
+#define SHORTENED 8 /* largest number of halvings of a step */
+#define WORTH     8 /* expected number of further iterations above which a new tangent is made (modified) */
+/* Iterations of a step of elastic bodies with friction, beyond which only round-off is left. */
+#define FEW             5
+#define LOADS_ROUND_OFF 1e-14 /* of the right-hand side of the contact system, the loads: 45 eps of K U */
+/* Residual of a solve without a factor as a share of the iterate's: three digits an iteration, which Newton's method
+   gains anyway (scripts/bench-history). */
+#define FORCING 1e-3
 
 /* Data of the previous iteration. */
 typedef struct {
@@ -105,7 +110,7 @@ static PetscErrorCode NewtonRoundOff(HycoPath p, PetscReal *least)
   PetscCall(VecNorm(p->rhs, NORM_INFINITY, &size[0]));
   PetscCall(VecPointwiseMult(p->work, p->diagonal, p->U));
   PetscCall(VecNorm(p->work, NORM_INFINITY, &size[1]));
-  *least = PetscMax(NOTHING * size[0], HYCO_NOTHING * size[1]);
+  *least = PetscMax(LOADS_ROUND_OFF * size[0], HYCO_NOTHING * size[1]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

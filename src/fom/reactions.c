@@ -116,7 +116,9 @@ static PetscErrorCode FindSupports(HycoFOM f, PetscInt support[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define SMALL 1e-6 /* share of all forces to which a body with smaller ones is compared */
+/* Of all forces or moments: the size by which the balance of a body with smaller ones is judged; 100 times the residual
+   of 1e-8. */
+#define SMALL_BALANCE 1e-6
 
 /* Everything on a body, or on bodies that share nodes or are tied: the magnitudes too, those of moments about the
    centre. */
@@ -252,7 +254,7 @@ static PetscErrorCode AddUp(HycoFOM f, PetscReal *work, PetscInt support[], Sums
 static PetscReal ReactionsRemainingGap(const HycoFOM f, const Sums *s, PetscInt b, PetscReal force, PetscReal moment)
 {
   const OnBody *on = &s->body[b];
-  const PetscReal size = PetscMax(on->size, SMALL * force), turns = PetscMax(on->turns, SMALL * moment);
+  const PetscReal size = PetscMax(on->size, SMALL_BALANCE * force), turns = PetscMax(on->turns, SMALL_BALANCE * moment);
   const PetscReal *F = on->all.force;
   PetscReal most = 0;
 

@@ -22,8 +22,9 @@ static PetscErrorCode SetUp(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define ACTS                                                                                                           \
-  1e-12 /* of a Gram matrix relative to its largest value: less, and closed contacts do not determine a motion */
+/* Of the largest value of a Gram matrix: a motion's length to 1e-6, the accuracy of normals; less, and closed contacts
+   do not determine it. */
+#define ACTS    1e-12
 #define REPEATS 2 /* the second removes the rounding of the first */
 
 /* Adds the rigid motions that contact alone prevents, which K leaves open: so that the contacts with a force close, in

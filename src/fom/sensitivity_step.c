@@ -9,9 +9,6 @@
 #include <hycoentries.h>
 #include <hycomaterialimpl.h>
 
-#define JUMP                                                                                                           \
-  1e-3 /* share of the largest slope of a stress by which those to the two sides differ, if it is no curvature */
-
 struct _n_HycoSensitivityStep {
   HycoFOM f;
   PetscReal t0;             /* the begin of the step */
@@ -345,7 +342,7 @@ static PetscErrorCode TakeStates(HycoSensitivityStep a, const PetscReal mu[], co
     slope[i] = d->weight[0] * v[0][i] + d->weight[1] * v[1][i] + d->weight[2] * v[2][i];
   MeasureJumps(a, d, v, most);
   HycoAllreduce(most, 2, MPIU_REAL, MPI_MAX, HycoComm(f));
-  *smooth = (PetscBool)(!a->failed && most[1] <= JUMP * most[0]);
+  *smooth = (PetscBool)(!a->failed && most[1] <= HYCO_KINK * most[0]);
   HycoAllreduce(smooth, 1, HYCO_MPI_BOOL, MPI_LAND, HycoComm(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -3,10 +3,10 @@
 #include <hycosceneimpl.h>
 #include <hycoslip.h>
 
-/* The shares of mu r_n above which a contact counts as slipping. */
+/* Share of mu r_n from which a contact counts as slipping: 1 less the residual of the forces, 1e-8. */
 #define SLIPS (1 - 1e-8)
-/* Slips below this share of the largest displacement are round-off, and do no work. */
-#define ROUNDING 1e-12
+/* Of the largest displacement: 4500 eps, a slip that is the difference of displacements, and does no work. */
+#define SLIP_ROUND_OFF 1e-12
 
 /* The rows of the contacts and their cones. */
 static PetscErrorCode CountRows(HycoSlip *s, HycoScene scene, const HycoPairs *pairs)
@@ -120,7 +120,7 @@ static void SlipAdd(HycoSlip *h, PetscInt k, const PetscReal r[], const PetscRea
   }
   s->state[k] = !(r[0] > 0) ? HYCO_OPEN : PetscSqrtReal(size) < SLIPS * h->mu[k] * r[0] ? HYCO_STICK : HYCO_SLIP;
   /* Sticking contacts have slips of round-off, whose work would add up over many steps. */
-  if (PetscAbsReal(work) > ROUNDING * PetscSqrtReal(size) * most) s->work[k] += work;
+  if (PetscAbsReal(work) > SLIP_ROUND_OFF * PetscSqrtReal(size) * most) s->work[k] += work;
 }
 
 /* L, w: by row of this rank, w = D - B U. most: the largest displacement, the scale of round-off. */

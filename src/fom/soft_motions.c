@@ -6,7 +6,9 @@
 #include <hycofomimpl.h>
 #include <petscblaslapack.h>
 
-#define SOFT 1e-4 /* stiffness of a motion relative to that of K's diagonal: above, K^-1 is accurate */
+/* Of K's diagonal, the stiffness of a motion on springs: above it K^-1 loses at most four digits to the motion
+   (tests/contact/friction_random.py). */
+#define SOFT_STIFFNESS 1e-4
 
 /* E = V^T K_s V for the springs' K_s and the n motions of one part from `first` on, on every rank. */
 static PetscErrorCode SpringEnergy(HycoFOM f, const HycoMotions *motions, PetscInt first, PetscInt n, PetscReal E[])
@@ -84,7 +86,7 @@ static PetscErrorCode SoftMotionsKeep(HycoFOM f, HycoMotions *motions, PetscReal
 
     PetscCall(VecPointwiseMult(work, diagonal, v[k]));
     PetscCall(VecDot(work, v[k], &size));
-    if (stiffness[k] > SOFT * size) continue;
+    if (stiffness[k] > SOFT_STIFFNESS * size) continue;
     most = PetscMax(most, stiffness[k]);
     PetscCall(VecDuplicate(v[k], &s->v[s->n]));
     PetscCall(VecCopy(v[k], s->v[s->n]));

@@ -4,7 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Share of the mesh's length up to which two nodes are at the same place. */
+/* Of the mesh's length, the distance of two nodes: single precision in a mesh file, 6e-8, would be above it, the
+   round-off of doubles is far below. */
 #define SAME_PLACE 1e-8
 
 /* From the reference simplex to the regular one, inverted. Column by column: J maps from the element's reference

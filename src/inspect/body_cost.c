@@ -9,23 +9,31 @@
 static const PetscReal VALUES[2] = {3, 5}, SAMPLES[2] = {93, 273}, OF_TURNS[2] = {93, 993};
 #define MOST_VALUES 60
 #define SPREAD      3
+/* Seconds of reading and recognition: announced against measured times (tests/models/bodies.py). */
 #define START       0.3
 #define MODES       80
-#define ACTIVE      0.3
 #define ENTRIES     15
 #define HELD        8
 #define INNER       1800
 #define INNER_TABLE 6e6
 #define TURNS       3
 
-/* Solves with sparse factors, dense products on narrow matrices, and decompositions, relative to a product of large
-   ones; a prediction, relative to a product with a vector. */
+/* Speed of a prediction relative to a product with a vector: announced against measured times (tests/models/bodies.py).
+   */
 #define ONLINE_SHARE 0.65
-#define SOLVE_SHARE  0.12
+/* Speed of solves with sparse factors relative to a product of large matrices: announced against measured
+   times (tests/models/bodies.py). */
+#define SOLVE_SHARE 0.12
+/* Speed of products of narrow matrices relative to one of large ones: announced against measured times
+   (tests/models/bodies.py). */
 #define NARROW_SHARE 0.25
-#define POD_SHARE    0.12
-#define MARGIN       1.5  /* of the ends of the range */
-#define EACH         5e-5 /* seconds beside the operations of a solve */
+/* Speed of decompositions relative to a product of large matrices: announced against measured times
+   (tests/models/bodies.py). */
+#define POD_SHARE 0.12
+/* Factor of the ends of the announced range: what the speed of a machine varies by (tests/models/bodies.py). */
+#define RANGE_MARGIN 1.5
+/* Seconds of a solve beside its operations: announced against measured times (tests/models/bodies.py). */
+#define EACH_SOLVE 5e-5
 
 /* The unknowns of the surfaces that may touch. Rank 0. */
 static PetscErrorCode CountSurface(HycoFOM f, PetscReal *n)
@@ -80,12 +88,13 @@ static void AddBody(const HycoInspection *in, PetscReal ns, PetscReal share, Pet
   /* Condensations, those held out too; their factors are counted with the full-order solutions. */
   *training += (values + 2 * axes) * ns * ns * ns / NARROW_SHARE;
   /* Displacements, and the rows of the model. */
-  *training += (columns + (modes + inner) * values) * (4 * entries / SOLVE_SHARE + EACH * speed);
+  *training += (columns + (modes + inner) * values) * (4 * entries / SOLVE_SHARE + EACH_SOLVE * speed);
   /* POD of the last samples, and before of half and a quarter of them; a turned body has several fields for each
      mode. */
   *training += 1.3 * (6 * rows * most * most + 20 * most * most * most) / POD_SHARE;
   if (turned) *training += (6 * rows + 20 * turns) * turns * turns / POD_SHARE;
-  *prediction += ACTIVE * ns * ns * (values > 1 ? values : 1) + 2 * ACTIVE * ns * (modes + inner) * values;
+  *prediction += HYCO_ASSUMED_CLOSED * ns * ns * (values > 1 ? values : 1) +
+                 2 * HYCO_ASSUMED_CLOSED * ns * (modes + inner) * values;
 }
 
 /* The costs of a model of bodies: in->body_values values of the parameters that change a body, 0: no such model.
@@ -95,7 +104,7 @@ PetscErrorCode HycoInspectBodyCost(HycoFOM f, const HycoBodyParts *parts, const 
 {
   PetscInt shape[HYCO_MAX_PARAMETERS];
   const PetscInt n_theta = HycoBodyPartsShapes(parts, -1, shape);
-  const PetscReal active = ACTIVE * (PetscReal)f->n_contacts;
+  const PetscReal active = HYCO_ASSUMED_CLOSED * (PetscReal)f->n_contacts;
   PetscReal ns = 0;
   PetscBool *turned, any = PETSC_FALSE;
 
@@ -124,7 +133,7 @@ PetscErrorCode HycoInspectBodyCost(HycoFOM f, const HycoBodyParts *parts, const 
     in->body_values = (PetscInt)PetscMin(PetscPowReal(VALUES[end], (PetscReal)n_theta), MOST_VALUES);
     in->body_training[end] = ((training / speed[0] + samples * in->body_prediction) / f->size + START +
                               (HELD + (n_theta ? in->body_values + 2 * n_theta : 0)) * in->first) *
-                             (end ? MARGIN : 1 / MARGIN);
+                             (end ? RANGE_MARGIN : 1 / RANGE_MARGIN);
   }
   PetscCall(PetscFree(turned));
   PetscFunctionReturn(PETSC_SUCCESS);

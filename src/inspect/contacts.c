@@ -2,9 +2,6 @@
 #include "inspect.h"
 #include <hycocarriers.h>
 
-/* Share of the mesh's extent: a smaller gap is round-off. */
-#define ROUNDING 1e-12
-
 /* Slave's facet size over the master's around contact k; 0: one of the groups is not a surface. size: room for 2
    reals a node. */
 static PetscReal InspectContactsCoarseness(const HycoPairs *p, PetscInt k, PetscInt n_nodes, const PetscReal size[])
@@ -202,7 +199,7 @@ PetscErrorCode HycoInspectGaps(HycoInspection *in, HycoFE fe, PetscBool first)
       if (HycoPairsAlone(s, p, k)) continue;
       facing++;
       /* Surfaces that touch are reported as touching, not as penetrating by 1e-17. */
-      if (PetscAbsReal(gap[k]) <= ROUNDING * length) gap[k] = 0;
+      if (PetscAbsReal(gap[k]) <= HYCO_LENGTH_ROUND_OFF * length) gap[k] = 0;
       r->gap_min = PetscMin(r->gap_min, gap[k]);
       r->gap_max = PetscMax(r->gap_max, gap[k]);
     }

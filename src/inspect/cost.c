@@ -6,7 +6,8 @@
 
 /* Assumed number of solutions if no training points are given. */
 #define TYPICAL_TRAINING 100
-/* Speed of a sparse factorisation as a share of a matrix product's. */
+/* Speed of a sparse factorisation relative to a matrix product: announced against measured times
+   (tests/command/check.py). */
 #define SPARSE_SHARE 0.5
 
 /* Memory of the process now, summed over all ranks. ru_maxrss is in kilobytes on Linux, and is the largest so far. */

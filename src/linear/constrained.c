@@ -9,11 +9,14 @@
 
 /* Iterations for the estimate of a level's largest eigenvalue, the margin added to it, and the start of a smoother's
    interval: PETSc's defaults for Chebyshev's method. */
-#define HYCO_EIGEN_ITS    10
+#define HYCO_EIGEN_ITS 10
+/* Factor of the estimated largest eigenvalue: PETSc's default for Chebyshev's method. */
 #define HYCO_EIGEN_SAFETY 1.1
-#define HYCO_EIGEN_LEAST  0.1
+/* Start of a smoother's interval as a share of its end: PETSc's default for Chebyshev's method. */
+#define HYCO_EIGEN_LEAST 0.1
 
-/* The share of the initial residual that is compared with the loads: without loads only the constraints act. */
+/* Share of the initial residual that is compared with the loads: without loads only the constraints act
+   (tests/fom/iterative.py). */
 #define HYCO_START 0.01
 
 /* The largest eigenvalue of D^-1 K by Lanczos' method. The start has irregular entries by a hash of the row: the

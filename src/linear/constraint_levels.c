@@ -6,12 +6,14 @@
 */
 #include "constrained.h"
 
-/* Directions of an aggregate's normals below this share of the largest are dropped. */
+/* Of the largest direction of an aggregate's normals: a tenth; smaller ones would make the coarse constraints nearly
+   dependent (tests/fom/iterative.py). */
 #define HYCO_DIRECTION 0.1
 /* Up to this number of constraints on a level, every rank factors their matrix and solves with it: MUMPS's
    communication takes longer than the rest. */
 #define HYCO_ALIKE 20000
-/* Shift of the diagonal of the coarse matrices of constraints, which may be almost dependent. */
+/* Of the diagonal of the coarse matrices of constraints: half of the digits, as these may be almost dependent
+   (tests/fom/iterative.py). */
 #define HYCO_COARSE_SHIFT 1e-8
 
 /* The constraints of a level, on every rank: their nodes' first unknowns, and their normals (3 each). */

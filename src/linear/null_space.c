@@ -5,9 +5,11 @@
 #include <hycolinear.h>
 #include <petscblaslapack.h>
 
-#define SMALL    1e-9  /* share of the loads below which their work on a motion may be round-off */
-#define BALANCED 1e-13 /* share of its terms below which it is round-off */
-#define APART    1e-14 /* share of a motion that another body has */
+/* Of the sum of the loads, their work on a motion: 4.5e6 eps; only smaller work is tested for round-off, as the test
+   costs a solve and a sum. */
+#define SUSPECT_WORK 1e-9
+/* Of the largest entry of a motion, another body's: 45 eps, the solve for the motion that moves one pin. */
+#define OTHER_BODY 1e-14
 
 /* Number of rigid modes attached to K: 0 if K is regular. */
 PetscErrorCode HycoKernelSize(Mat K, PetscInt *n)
@@ -223,7 +225,7 @@ PetscErrorCode HycoMotionClean(PetscInt n, const Vec v[], const PetscReal stiffn
   PetscFunctionBegin;
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecNorm(F, NORM_1, &all));
-  for (PetscInt i = 0; i < n; i++) any = (PetscBool)(any || (w[i] != 0 && PetscAbsReal(w[i]) <= SMALL * all));
+  for (PetscInt i = 0; i < n; i++) any = (PetscBool)(any || (w[i] != 0 && PetscAbsReal(w[i]) <= SUSPECT_WORK * all));
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscBLASIntCast(n, &size));
   PetscCall(PetscMalloc3(n * n, &V, n, &c, n, &pivot));
@@ -233,7 +235,7 @@ PetscErrorCode HycoMotionClean(PetscInt n, const Vec v[], const PetscReal stiffn
   for (PetscInt i = 0; i < n && !info; i++) {
     PetscReal sum, terms, reach;
 
-    if (w[i] == 0 || PetscAbsReal(w[i]) > SMALL * all) continue;
+    if (w[i] == 0 || PetscAbsReal(w[i]) > SUSPECT_WORK * all) continue;
     /* The motion that moves this pin by 1 and no other one. */
     PetscCall(PetscArrayzero(c, n));
     c[i] = 1;
@@ -242,7 +244,7 @@ PetscErrorCode HycoMotionClean(PetscInt n, const Vec v[], const PetscReal stiffn
     resisted = PETSC_FALSE;
     for (PetscInt k = 0; k < n; k++) {
       /* Those of other bodies have round-off here. */
-      if (!(PetscAbsReal(c[k]) > APART)) continue;
+      if (!(PetscAbsReal(c[k]) > OTHER_BODY)) continue;
       PetscCall(VecAXPY(motion, c[k], v[k]));
       resisted = (PetscBool)(resisted || (stiffness && stiffness[k] != 0));
     }
@@ -251,7 +253,7 @@ PetscErrorCode HycoMotionClean(PetscInt n, const Vec v[], const PetscReal stiffn
     PetscCall(VecPointwiseMult(work, motion, F));
     PetscCall(VecSum(work, &sum));
     PetscCall(VecNorm(work, NORM_1, &terms));
-    if (PetscAbsReal(sum) <= PetscMax(BALANCED * terms, least * reach)) w[i] = 0;
+    if (PetscAbsReal(sum) <= PetscMax(HYCO_WORK_ROUND_OFF * terms, least * reach)) w[i] = 0;
   }
   HycoDestroyAll(&motion, &work);
   PetscCall(PetscFree3(V, c, pivot));

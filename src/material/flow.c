@@ -12,7 +12,7 @@
 /* -- begin: in exported models too -- */
 #define ITERATIONS 500  /* every eighth is a bisection: ten times more than any bracket needs */
 #define BLOCK      32   /* points evaluated together */
-#define CLOSE      1e-8 /* after a Newton step of this relative size the error is of the order of its square */
+#define CLOSE      1e-8 /* of the unknown, Newton's last step: the error is of the order of its square, eps */
 
 /* The bracket [lo, hi] of a root, and the next iterate: `newton`, unless it leaves the bracket or a bisection is
    due. Returns whether the iteration has converged. */
@@ -343,16 +343,21 @@ static PetscErrorCode FlowUpdate(HycoMaterial material, HycoMaterialPoints *m)
 
 /* -- derivatives of a step -- */
 
-#define RELATIVE 3e-6   /* step of the differences of a rule's functions */
-#define REST     1e-150 /* a stress beside 0 */
-#define BORDER   1e-8   /* share of the yield stress: less beyond or below it is round-off */
+/* Step of the differences of a rule's functions as a share of their data: the cube root of eps, 6e-6, where the errors
+   of truncation and round-off of a central difference are alike. */
+#define DIFFERENCE_STEP 3e-6
+/* Stress in place of 0, at which a rule's logarithm exists: any that no power of it underflows. */
+#define AT_REST 1e-150
+/* Of the yield stress: ten times the error of the flow's unknown; nearer to it, yielding is undecided and a derivative
+   is one-sided. */
+#define YIELD_BORDER 1e-8
 
-/* How far a direction of change goes for RELATIVE of the data, from what it has gone so far. */
+/* How far a direction of change goes for DIFFERENCE_STEP of the data, from what it has gone so far. */
 static void FlowStepLength(PetscReal value, PetscReal change, PetscReal *reach)
 {
   const PetscReal own = value != 0 ? PetscAbsReal(value) : 1;
 
-  if (change != 0) *reach = PetscMin(*reach, RELATIVE * own / PetscAbsReal(change));
+  if (change != 0) *reach = PetscMin(*reach, DIFFERENCE_STEP * own / PetscAbsReal(change));
 }
 
 /* The derivatives of the creep strain at the stress q, and of the yield stress at the plastic strain x, by the data
@@ -405,7 +410,8 @@ static PetscBool FlowIsYielding(const HycoFlowRule *rule, Solved *s)
 
   if (!rule->yield || !(w.trial > 0)) return PETSC_FALSE;
   before = (*rule->yield)(&w.p, w.p.plastic0, &hardening);
-  if (before < 0 || s->plastic > 0 || s->q < (1 - BORDER) * before) return (PetscBool)(before >= 0 && s->plastic > 0);
+  if (before < 0 || s->plastic > 0 || s->q < (1 - YIELD_BORDER) * before)
+    return (PetscBool)(before >= 0 && s->plastic > 0);
   StartCreep(rule, &w);
   while (!w.done) IterateCreep(rule, &w);
   return (PetscBool)(w.q > before);
@@ -429,7 +435,7 @@ static void TakeSolved(const HycoFlowRule *rule, const HycoMaterialPoints *m, Pe
   s->slope = s->hardening = 0;
   s->yield = -1;
   /* At rest: whether creep begins in proportion to the stress. */
-  if (rule->creep && s->w.p.dt > 0) (void)(*rule->creep)(&s->w.p, s->w.trial > 0 ? s->q : REST, &s->slope);
+  if (rule->creep && s->w.p.dt > 0) (void)(*rule->creep)(&s->w.p, s->w.trial > 0 ? s->q : AT_REST, &s->slope);
   if (rule->yield) s->yield = (*rule->yield)(&s->w.p, state[ns + 1], &s->hardening);
   s->yields = FlowIsYielding(rule, s);
 }
@@ -492,9 +498,9 @@ static void FlowRates(const HycoFlowRule *rule, const HycoMaterialPoints *m, Pet
   }
   d->rate = PetscMax(d->rate, PetscMax(PetscAbsReal(trial), PetscAbsReal(dq)));
   /* On the yield surface the point stays there, or its derivatives differ between the two sides. */
-  if (s->yields && H * s->plastic <= BORDER * s->yield)
+  if (s->yields && H * s->plastic <= YIELD_BORDER * s->yield)
     d->apart = PetscMax(d->apart, H * PetscAbsReal(*plastic));
-  else if (!s->yields && s->yield >= 0 && s->q >= (1 - BORDER) * s->yield)
+  else if (!s->yields && s->yield >= 0 && s->q >= (1 - YIELD_BORDER) * s->yield)
     d->apart = PetscMax(d->apart, PetscAbsReal(dq - s->hardening * dstate0[ns + 1] - by_yield));
 }
 

@@ -495,7 +495,7 @@ static PetscErrorCode TakeClosed(HycoReducer t, HycoROM m)
     PetscReal most = 0;
 
     for (PetscInt i = 0; i < N; i++) most = PetscMax(most, L[i]);
-    for (PetscInt i = 0; i < N; i++) m->model->closed[i] = m->model->closed[i] || L[i] > HYCO_PRESSES * most;
+    for (PetscInt i = 0; i < N; i++) m->model->closed[i] = m->model->closed[i] || L[i] > HYCO_FORCE_ROUND_OFF * most;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,22 +1,30 @@
 /*
   The accuracy of a model: compares its predictions at held-out points with their full-order solutions, and calibrates
-  the online error estimates with the result (error_estimate.c). A log-linear formula is fitted to the errors and raised
-  above SHARE of them, each compared with a formula fitted without it. Held-out points are distributed like a user's
-  points over the region of training, so that the quantile number ceil(SHARE (n + 1)) of the ratios is a bound for SHARE
-  of future points (split conformal prediction: Vovk, Gammerman, Shafer, Algorithmic Learning in a Random World, 2005),
-  however accurate the formula is; an accurate formula only makes the bound tighter. The settings were chosen with the
-  same points, for which MARGIN allows. The scene's outputs have formulas for their absolute errors (judge_outputs.c).
+  the online error estimates with the result (error_estimate.c). A log-linear formula is fitted to the errors and
+  raised above BOUNDED_SHARE of them, each compared with a formula fitted without it. Held-out points are distributed
+  like a user's points over the region of training, so that the quantile number ceil(BOUNDED_SHARE (n + 1)) of the
+  ratios is a bound for BOUNDED_SHARE of future points (split conformal prediction: Vovk, Gammerman, Shafer,
+  Algorithmic Learning in a Random World, 2005), however accurate the formula is; an accurate formula only makes the
+  bound tighter. The settings were chosen with the same points, for which CHOICE_MARGIN allows. The scene's outputs
+  have formulas for their absolute errors (judge_outputs.c).
 */
 #include <hycoalgorithms.h>
 #include <hycoreducerimpl.h>
 #include <math.h>
 #include <stdio.h>
 
-#define SHARE      0.93
-#define MARGIN     1.2
-#define LEAST      10   /* smallest number of predictions for a formula */
-#define SMALL      0.3  /* share of a feature's median, its floor: a smaller feature is no sign of a smaller error */
-#define NEGLIGIBLE 1e-3 /* share of the errors' median: least error that is distinguished */
+/* Share of the held-out errors that estimates bound: 0.93, so that 0.9 of each drawn scene's unseen points are bounded
+   (tests/models/estimates.py). */
+#define BOUNDED_SHARE 0.93
+/* Factor of the estimates, because the settings were chosen by the same points: drawn scenes
+   (tests/models/estimates.py). */
+#define CHOICE_MARGIN 1.2
+#define LEAST         10 /* smallest number of predictions for a formula */
+/* Share of a feature's median, its floor: a smaller feature is no sign of a smaller error. */
+#define LEAST_FEATURE 0.3
+/* Of the median of the errors: the least error that is distinguished, as one exact point must not tilt a formula of
+   logarithms. */
+#define NEGLIGIBLE 1e-3
 
 /* The estimated errors, in the order of HycoEstimateKind. */
 static const HycoErrorKind errors[HYCO_N_ESTIMATES] = {HYCO_ERROR_U, HYCO_ERROR_SIGMA, HYCO_ERROR_LAMBDA};
@@ -87,7 +95,7 @@ static PetscErrorCode CalibrateBorrow(PetscInt n, const PetscInt group[], const 
     if (!estimates->has[e]) continue;
     PetscCall(PetscArraycpy(other, estimates->law[e], HYCO_ESTIMATE_FEATURES + 1));
     /* Raised anew: the constant of another error says nothing about this one. */
-    PetscCall(HycoRaiseBound(n, group, HYCO_ESTIMATE_FEATURES, X, y, SHARE, other));
+    PetscCall(HycoRaiseBound(n, group, HYCO_ESTIMATE_FEATURES, X, y, BOUNDED_SHARE, other));
     if (MeanOf(n, X, other) < MeanOf(n, X, law)) PetscCall(PetscArraycpy(law, other, HYCO_ESTIMATE_FEATURES + 1));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -115,9 +123,9 @@ static PetscErrorCode CalibrateFit(PetscInt n, const HycoHeldOut rows[], const P
       if (pass == 0) explanatory = filled;
     }
   }
-  PetscCall(HycoUpperBound(n, explanatory ? explanatory : n, group, p, X, y, SHARE, law));
+  PetscCall(HycoUpperBound(n, explanatory ? explanatory : n, group, p, X, y, BOUNDED_SHARE, law));
   if (borrow) PetscCall(CalibrateBorrow(n, group, X, y, estimates, law));
-  law[p] += PetscLogReal(MARGIN);
+  law[p] += PetscLogReal(CHOICE_MARGIN);
   PetscCall(PetscFree3(X, y, group));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -219,9 +227,9 @@ static PetscErrorCode FitAll(HycoReducer t, PetscInt n, PetscInt least, const Hy
   if (n < least) PetscFunctionReturn(PETSC_SUCCESS);
   estimates->n = n;
   for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++) {
-    PetscCall(CalibrateMedian(n, rows[0].feature + j, (PetscInt)(sizeof(*rows) / sizeof(PetscReal)), 1 / SMALL,
+    PetscCall(CalibrateMedian(n, rows[0].feature + j, (PetscInt)(sizeof(*rows) / sizeof(PetscReal)), 1 / LEAST_FEATURE,
                               &estimates->floor[j]));
-    estimates->floor[j] *= SMALL;
+    estimates->floor[j] *= LEAST_FEATURE;
   }
   /* The distance has a floor of its own: between training points it is never 0, and its median says little. */
   PetscCall(CalibrateSpacing(t, &estimates->floor[HYCO_ESTIMATE_DISTANCE]));

@@ -1,17 +1,19 @@
 /*
   Which settings of a search are chosen, and which can no longer be chosen. `ratio` is the largest quotient of an error
   and its target; for an attempt that was dropped, a lower bound of it. The choice is the cheapest attempt whose ratio
-  is at most max(1, LITTLE times the least ratio), but does not miss a limit if another does not. This bound only
+  is at most max(1, WORTH_FASTER times the least ratio), but does not miss a limit if another does not. This bound only
   decreases with further attempts: settings that exceed it are excluded for good. So are settings whose ratio exceeds 1
   and the ratio of settings that are not more expensive: if those are excluded, so are these; and settings that cost no
   less than others that meet the targets, whatever their errors, which are then not computed.
 */
 #include <hycoreducerimpl.h>
 
-#define LITTLE                                                                                                         \
-  1.25                 /* a model whose ratio exceeds the best by at most this factor is acceptable if it is           \
-                          cheaper */
-#define TIE (1 + 1e-6) /* closer ratios may be in another order on other numbers of ranks */
+/* Factor of the best ratio up to which a cheaper model is taken: a quarter more of the error is little beside the
+   factors between settings. */
+#define WORTH_FASTER 1.25
+/* Factor up to which ratios are equal: errors of solves with a residual of 1e-8 may be in another order on other
+   numbers of ranks. */
+#define TIED_RATIO (1 + 1e-6)
 
 /* Whether it gave a model that was judged at all held-out points, or as far as necessary: a path that does not reach
    its end has the worst ratio. */
@@ -20,7 +22,7 @@ static PetscBool AttemptComplete(const HycoAttempt *a)
   return (PetscBool)(!a->failure[0] && !a->beaten_by);
 }
 
-/* The largest ratio that may be chosen (above): max(1, LITTLE times the least), but below HYCO_MISSES if the best
+/* The largest ratio that may be chosen (above): max(1, WORTH_FASTER times the least), but below HYCO_MISSES if the best
    is. */
 static PetscReal AttemptBound(PetscInt n, const HycoAttempt attempt[], const HycoAttempt **best)
 {
@@ -29,8 +31,8 @@ static PetscReal AttemptBound(PetscInt n, const HycoAttempt attempt[], const Hyc
     if (AttemptComplete(&attempt[k]) && (!*best || attempt[k].ratio < (*best)->ratio)) *best = &attempt[k];
   }
   if (!*best) return PETSC_INFINITY;
-  return (*best)->ratio <= HYCO_MISSES ? PetscMin(HYCO_MISSES, PetscMax(1, LITTLE * (*best)->ratio))
-                                       : LITTLE * (*best)->ratio;
+  return (*best)->ratio <= HYCO_MISSES ? PetscMin(HYCO_MISSES, PetscMax(1, WORTH_FASTER * (*best)->ratio))
+                                       : WORTH_FASTER * (*best)->ratio;
 }
 
 /* Continuous and increasing: 1 at the target, HYCO_MISSES at the limit, so that one number orders errors with and
@@ -74,7 +76,7 @@ PetscReal HycoAttemptsLimit(PetscInt n, const HycoAttempt attempt[], PetscReal c
     by = &attempt[k];
   }
   *beaten = by && limit < PETSC_INFINITY ? by->number : 0;
-  return limit * TIE;
+  return limit * TIED_RATIO;
 }
 
 /* Whether an attempt that is not more expensive meets the targets. */

@@ -9,9 +9,11 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Indicators with a smaller relative difference count as equal. */
-#define TIE      1e-9
-#define ACCURATE 1e-13 /* default energy left out of the bases */
+/* Of an indicator: solves on other numbers of ranks differ by less; the lowest row is then taken
+   (tests/training/greedy.py). */
+#define TIED_INDICATOR 1e-9
+/* Of the energy of the snapshots, what bases leave out by default: 450 eps, below which modes are round-off. */
+#define DEFAULT_ENERGY 1e-13
 
 typedef struct {
   HycoSnapshots store;
@@ -205,7 +207,7 @@ static PetscBool GreedyWorse(const PetscReal a[], const PetscReal b[])
 {
   const PetscInt by = PetscIsInfReal(a[0]) && PetscIsInfReal(b[0]) ? 3 : 0;
 
-  return (PetscBool)(PetscIsInfReal(b[by]) ? PETSC_FALSE : a[by] > b[by] * (1 + TIE));
+  return (PetscBool)(PetscIsInfReal(b[by]) ? PETSC_FALSE : a[by] > b[by] * (1 + TIED_INDICATOR));
 }
 
 /* Distance from training point k to the nearest solution. Scaled to the ranges; only orders points, so that an
@@ -229,7 +231,7 @@ static PetscBool GreedyPrecedes(HycoReducer t, const Loop *loop, PetscInt a, Pet
   const PetscReal *of_a = loop->value + 4 * a, *of_b = loop->value + 4 * b;
 
   if (!PetscIsInfReal(of_a[3]) || !PetscIsInfReal(of_b[3])) return GreedyWorse(of_a, of_b);
-  return (PetscBool)(GreedyDistance(t, loop, a) > GreedyDistance(t, loop, b) * (1 + TIE));
+  return (PetscBool)(GreedyDistance(t, loop, a) > GreedyDistance(t, loop, b) * (1 + TIED_INDICATOR));
 }
 
 /* The worst point that is not solved yet (-1: none is left), and the data for the monitor. */
@@ -319,7 +321,7 @@ static PetscErrorCode SetSettings(HycoReducer t)
   if (!t->search || t->prototype->model->traits.settings != HYCO_SETTINGS_RID) PetscFunctionReturn(PETSC_SUCCESS);
   if (!pinned[HYCO_CHOICE_TOLERANCE])
     t->tol[HYCO_SEED_DISPLACEMENT] = t->tol[HYCO_SEED_STRESS] = t->tol[HYCO_SEED_FORCE] = t->tol[HYCO_SEED_INELASTIC] =
-        ACCURATE;
+        DEFAULT_ENERGY;
   if (!pinned[HYCO_CHOICE_HYBRID] && !pinned[HYCO_CHOICE_LAYERS] && !t->whole_rid)
     PetscCall(HycoReducerFindPlane(t, &t->plane));
   /* On a plane of symmetry all displacements of A are full order, see HycoReducerFindPlane(). */

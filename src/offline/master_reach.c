@@ -11,7 +11,9 @@
 /* A contact is followed up to this multiple of the longest distance that closed in training, plus a share of a
    facet. */
 #define REACH_FACTOR 2
-#define REACH_FACET  0.5
+/* Distance beyond what closed in training up to which contacts are followed, in facets: half, as a master is known to
+   half a facet. */
+#define REACH_FACET 0.5
 
 /* The slave nodes of moved surfaces, on a mesh of these surfaces. */
 typedef struct {

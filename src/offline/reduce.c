@@ -147,8 +147,8 @@ PetscErrorCode HycoReducerPOD(HycoReducer t, Mat S, PetscReal tol, PetscInt max_
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define DOMINANT  100   /* ratio of successive singular values */
-#define ROUND_OFF 1e-13 /* share of the first: smaller ones may be round-off */
+#define DOMINANT        100   /* ratio of successive singular values */
+#define VALUE_ROUND_OFF 1e-13 /* of the first singular value: 450 eps, below which values are round-off */
 
 /* The number of leading modes that dominate the energy. A body on a soft spring moves rigidly by much more than it
    deforms: the energy is that of rigid motions, and a small share of it, or of its round-off, is all deformation. */
@@ -159,7 +159,7 @@ static PetscInt CountDominant(const HycoScene scene, PetscInt n, const PetscReal
   PetscInt first = 0;
 
   for (PetscInt j = 0; scene->n_springs && j < most; j++) {
-    if (sigma[j] > DOMINANT * sigma[j + 1] && sigma[j + 1] > ROUND_OFF * sigma[0]) first = j + 1;
+    if (sigma[j] > DOMINANT * sigma[j + 1] && sigma[j + 1] > VALUE_ROUND_OFF * sigma[0]) first = j + 1;
   }
   return first;
 }

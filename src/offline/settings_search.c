@@ -22,23 +22,24 @@
 #include <stdio.h>
 #include <string.h>
 
-#define EXTENSION     2.5 /* edges of the contact surface's facets */
+/* Size of the first RID beyond the contacts, in edges of their facets: two layers and a half, so that a third one is in
+   on irregular meshes. */
+#define EXTENSION     2.5
 #define MANY_UNKNOWNS 600 /* largest RID for which "all" is tried automatically: its reduced matrix is dense */
-#define STALLED_ATTEMPTS                                                                                               \
-  3 /* attempts without progress that end a kind: a larger RID does not help if the basis lacks                        \
-       solutions */
+/* Attempts without progress that end a kind: a larger RID does not help if the basis lacks solutions. */
+#define STALLED_ATTEMPTS 3
+/* Ratio of an attempt to the best below which it is progress: 5 % is within the choice of the training points. */
 #define PROGRESS  0.95
-#define NO_EFFECT 0.05 /* relative change of the ratio that counts as none */
-#define MARGIN    0.1  /* ratio of settings that end the search */
-#define LEAST     2    /* models that are tried whatever they cost */
-#define USELESS                                                                                                        \
-  0.5                               /* a larger error of u is that of no model: the budget does not end the search
-                                       there */
-#define HOPELESS_ERROR          50  /* multiple of the target: above it no attempt so far gives a useful model */
-#define FEW_UNKNOWNS            300 /* a dense matrix of this size is cheap */
-#define MAX_ATTEMPTS            64
-#define ROUND                   4   /* share of the training points that is added at a time, as a divisor */
-#define EXPLANATORY_CORRELATION 0.3 /* correlation above which a parameter explains the errors */
+#define NO_EFFECT 0.05 /* change of the ratio that counts as none, relative: as PROGRESS */
+/* Ratio of an attempt of a type without settings that ends the search: ten times better than the targets. */
+#define ENDING_MARGIN  0.1
+#define LEAST          2   /* models that are tried whatever they cost */
+#define HOPELESS_ERROR 50  /* multiple of the target: above it no attempt so far gives a useful model */
+#define FEW_UNKNOWNS   300 /* a dense matrix of this size is cheap */
+#define MAX_ATTEMPTS   64
+#define ROUND          4 /* share of the training points that is added at a time, as a divisor */
+/* Correlation above which a parameter explains the errors: by chance 20 points reach 0.3 in one of five cases. */
+#define EXPLANATORY_CORRELATION 0.3
 #define WHOLE                   -1
 
 /* Sizes of RIDs and bases, the cheapest first; layers WHOLE: the whole mesh. */
@@ -375,7 +376,7 @@ static PetscErrorCode BuildAndJudge(Search *s, PetscBool all, HycoAttempt *a)
 /* Whether an attempt gave a model of any use. */
 static PetscBool IsUseful(const HycoAttempt *a)
 {
-  return (PetscBool)(!a->failure[0] && (a->beaten_by || !(a->held_out.largest[HYCO_ERROR_U] >= USELESS)));
+  return (PetscBool)(!a->failure[0] && (a->beaten_by || !(a->held_out.largest[HYCO_ERROR_U] >= HYCO_USELESS_ERROR)));
 }
 
 /* Whether a type with modes of its own has given one, with which a search may end that finds no other. */
@@ -778,7 +779,7 @@ static PetscErrorCode TryOne(Search *s, const HycoROM type)
    is cheaper than others and may save the training solutions. */
 static PetscBool SearchEndsWith(const Search *s, const HycoAttempt *best)
 {
-  return (PetscBool)(best && best->ratio <= (best->number <= s->n_own ? 1 : MARGIN) && !s->t->exhaustive);
+  return (PetscBool)(best && best->ratio <= (best->number <= s->n_own ? 1 : ENDING_MARGIN) && !s->t->exhaustive);
 }
 
 /* Lets a type refuse the scene's contacts, one with modes of its own the scene: why. Collective. begin() needs the

@@ -8,7 +8,7 @@
 
 /* Copies of each column needed by a merge: the joined matrix, its copy in the SVD, the resulting modes. */
 #define COPIES 3
-/* Loss allowed for all batches, relative to the noise: smaller than what decides which modes are above it. */
+/* Of the noise, what all merges of batches may lose: a tenth of what decides which modes are above it. */
 #define LOSS 0.1
 
 /* Number of columns of N rows that fit in memory, over all ranks: the same on any number of them. */

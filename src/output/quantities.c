@@ -233,7 +233,8 @@ static PetscErrorCode OfCell(HycoFE fe, PetscInt field, const PetscReal sigma[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define BESIDE 1e-5 /* step of differences by a stress, of its largest component */
+/* Step of differences by a stress as a share of its largest component: near the cube root of eps. */
+#define STRESS_STEP 1e-5
 
 /* slope += factor times the derivative of the field in a cell. */
 static PetscErrorCode AddCellDerivative(HycoFE fe, PetscInt field, const PetscReal sigma[], PetscInt cell,
@@ -246,7 +247,7 @@ static PetscErrorCode AddCellDerivative(HycoFE fe, PetscInt field, const PetscRe
   for (PetscInt k = 0; k < fe->n_sigma; k++) most = PetscMax(most, PetscAbsReal(s[k]));
   for (PetscInt k = 0; k < fe->n_sigma; k++) {
     /* Exact of a component; without a stress any step is. */
-    const PetscReal at = s[k], step = most > 0 ? BESIDE * most : 1;
+    const PetscReal at = s[k], step = most > 0 ? STRESS_STEP * most : 1;
     PetscReal value[2] = {0, 0};
 
     for (PetscInt j = 0; j < 2; j++) {
@@ -271,7 +272,8 @@ static void AddNodeDerivative(HycoFE fe, PetscInt field, const PetscReal u[], Pe
     slope[node * fe->dim + c] += factor * u[node * fe->dim + c] / length;
 }
 
-#define CLOSE 0.01 /* share of an extreme, within which the field may become it by a small change */
+/* Of an extreme, within which a cell's value may become it: the error of a model. */
+#define CLOSE_TO_EXTREME 0.01
 
 /* Keeps the marked cells in which the field is close to the extreme `value`. */
 static PetscErrorCode KeepClose(HycoFE fe, const HycoQuantity *q, const PetscReal u[], const PetscReal sigma[],
@@ -292,8 +294,8 @@ static PetscErrorCode KeepClose(HycoFE fe, const HycoQuantity *q, const PetscRea
       PetscCall(OfCell(fe, q->field, sigma, e, &here));
       least = PetscAbsReal(here - value);
     }
-    /* CLOSE leaves room for the extreme to move to a neighbour within the model's error. */
-    in[e] = (PetscBool)(in[e] && least <= CLOSE * PetscAbsReal(value));
+    /* CLOSE_TO_EXTREME leaves room for the extreme to move to a neighbour within the model's error. */
+    in[e] = (PetscBool)(in[e] && least <= CLOSE_TO_EXTREME * PetscAbsReal(value));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -77,7 +77,7 @@ static PetscErrorCode ContactResultsPrepare(HycoROM m, const PetscReal Lambda[],
   PetscCall(ContactResultsMake(m));
   PetscCall(ContactResultsUpdate(m, *fe));
   for (PetscInt k = 0; k < m->pairs.n; k++) most = PetscMax(most, Lambda[k]);
-  *least = HYCO_PRESSES * most;
+  *least = HYCO_FORCE_ROUND_OFF * most;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -58,11 +58,15 @@ const char *const HycoFeatureNames[] = {"misfit of the full-order displacements"
 /* Values of the features up to which no regime is new; 0: not used for this purpose. */
 static const PetscReal slight[HYCO_FEATURES] = {1e-6, 1e-6, 1e-3, 0, 0, 1e-7, 0.02, 0.02, 0.02};
 #define MOST_FACTOR 100 /* of the estimates in a new regime */
-#define FRESH                                                                                                          \
-  (0.5 / HYCO_UNSEEN)     /* half of the force at new contacts is a new regime, also if held-out points had it */
-#define INCONSISTENT 1e-3 /* smaller differences are none in practice; */
-#define UNJUDGED     1e-2 /* likewise in a model without held-out points */
-#define UNBALANCED   1e-8 /* forces that balance to it are those that balance but for round-off */
+/* Share of the force at new contacts that is a new regime: half, also if held-out points had it. */
+#define NEW_REGIME_FORCE (0.5 / HYCO_UNSEEN)
+/* Of the largest displacement of closed contacts, its distance from their gaps: 0.1 %, the accuracy of good models;
+   smaller distances are none in practice. */
+#define INCONSISTENT 1e-3
+/* Of the largest displacement of closed contacts, the same in a model without held-out points: ten times INCONSISTENT.
+   */
+#define UNJUDGED   1e-2
+#define UNBALANCED 1e-8 /* of the forces, their balance: the residual of solves, 1e-8 */
 
 /* Of sums of squares; x / 0 counts as 1, a full error, and stays finite for the formulas. */
 static PetscReal EstimateQuotient(PetscReal part2, PetscReal size2)
@@ -282,7 +286,8 @@ static PetscReal EstimateOutsideTraining(HycoROM m, const PetscReal feature[], P
 
   *which = -1;
   for (PetscInt j = 0; j < HYCO_FEATURES; j++) {
-    const PetscReal met = m->model->estimates.reached[j], reached = j == NEW_CONTACTS ? PetscMin(met, FRESH) : met;
+    const PetscReal met = m->model->estimates.reached[j],
+                    reached = j == NEW_CONTACTS ? PetscMin(met, NEW_REGIME_FORCE) : met;
 
     /* slight: changes below it are round-off of the feature, whatever the held-out values were. A negative `reached` is
        a feature that no held-out point had. */
@@ -308,9 +313,13 @@ static PetscBool ExceedsSceneResidual(HycoROM m, PetscReal inconsistency)
    more than a multiple of their largest error, and no less than a share of it. Along paths errors also peak between
    training points (where a body begins to collapse) without a sign in the features: there, an error of twice the
    largest is within five estimates. */
-#define MOST_OVER       3
-#define MANY            20.
-#define MOST_UNDER      30
+#define MOST_OVER 3
+/* Number of held-out points from which their largest error is not raised: of 20 the largest is within a factor of later
+   ones. */
+#define MANY_HELD_OUT 20.
+#define MOST_UNDER    30
+/* Largest held-out error of paths over an estimate, at most: two fifths of it, since errors peak between paths without
+   a sign in the features (tests/models/estimates.py). */
 #define MOST_UNDER_PATH 2.5
 #define MOST_FOLLOWED   10
 
@@ -327,7 +336,7 @@ static PetscReal EstimateClamped(HycoROM m, PetscReal estimate, PetscReal larges
    smaller one. */
 static PetscReal EstimateError(HycoROM m, const PetscReal law[], const PetscReal term[], PetscReal largest)
 {
-  const PetscReal few = PetscSqrtReal(PetscMax(1, MANY / (PetscReal)m->model->estimates.n));
+  const PetscReal few = PetscSqrtReal(PetscMax(1, MANY_HELD_OUT / (PetscReal)m->model->estimates.n));
 
   return m->model->traits.uniform ? MOST_OVER * few * largest
                                   : EstimateClamped(m, EstimateEvaluate(law, term), largest);

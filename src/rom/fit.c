@@ -9,17 +9,23 @@
 #include <petsctao.h>
 #include <string.h>
 
-#define EXACT   1e-9 /* a misfit below it is round-off */
-#define MINIMUM 1e-5 /* of the slope of the misfit, relative to what the derivatives allow */
-#define WEIGHT                                                                                                         \
-  1e-6                  /* of the regularisation of Gauss-Newton steps: for targets that do not determine all
-                           parameters */
-#define SAME       1e-4 /* relative difference of misfits that are one minimum's */
-#define STALLED    5    /* iterations in which a misfit that does not fall by SAME ends */
-#define ITERATIONS 200
-#define SEARCH     "10" /* predictions of a line search */
-#define INSIDE     1e-4 /* share of half the ranges */
-#define LEFT       1e-6 /* share of a parameter's derivatives that is left beside the others' and is not round-off */
+#define EXACT 1e-9 /* of the targets, a misfit: a tenth of the residual of 1e-8 */
+/* Of what the derivatives allow, the slope of the misfit: derivatives by differences are right to 1e-8, and gradients
+   at minima of tests/models/fit.py fall below. */
+#define MINIMUM 1e-5
+/* Weight of the regularisation of Gauss-Newton steps: below any curvature of the targets, above the square of their
+   round-off; for targets that do not determine all parameters. */
+#define WEIGHT 1e-6
+/* Of a misfit: minima from several starts that differ by less are one (tests/models/fit.py). */
+#define SAME_MISFIT 1e-4
+#define STALLED     5 /* iterations in which a misfit that does not fall by SAME_MISFIT ends */
+#define ITERATIONS  200
+#define SEARCH      "10" /* predictions of a line search */
+/* Step from the ends of the ranges as a share of half of them: the derivative at the load 0 of a floating body does not
+   exist, beside it it does. */
+#define INSIDE 1e-4
+/* Of a parameter's derivatives, what is left beside the others': 100 times the error of derivatives by differences. */
+#define LEFT_DERIVATIVE 1e-6
 
 typedef struct {
   HycoROM model;
@@ -288,7 +294,7 @@ static PetscErrorCode FitConverged(Tao tao, void *ctx)
   PetscCall(TaoGetIterationNumber(tao, &k));
   size = FitSize(f->n, f->r);
   if (k % STALLED == 0) {
-    if (k && size > (1 - SAME) * f->earlier) PetscCall(TaoSetConvergedReason(tao, TAO_CONVERGED_USER));
+    if (k && size > (1 - SAME_MISFIT) * f->earlier) PetscCall(TaoSetConvergedReason(tao, TAO_CONVERGED_USER));
     f->earlier = size;
   }
   if (IsMinimum(f, MINIMUM / 100)) PetscCall(TaoSetConvergedReason(tao, TAO_CONVERGED_GATOL));
@@ -379,7 +385,7 @@ static PetscErrorCode RunFrom(Fit *f, const PetscReal start[], const char type[]
 /* Whether two misfits are those of one minimum. */
 static PetscBool AreSame(PetscReal a, PetscReal b)
 {
-  return (PetscBool)(PetscAbsReal(a - b) <= SAME * PetscMin(a, b) + EXACT);
+  return (PetscBool)(PetscAbsReal(a - b) <= SAME_MISFIT * PetscMin(a, b) + EXACT);
 }
 
 /* The smaller misfit; of the same ones a minimum. */
@@ -458,14 +464,14 @@ static PetscErrorCode FitDetermined(const Fit *f, PetscInt *n)
       size += PetscAbsReal(f->J[k * f->n_par + p] * f->r[k]);
     }
     /* Where the targets are met the slope is round-off, and the end is no reason. */
-    if (!(PetscAbsReal(slope) > LEFT * size) || FitSize(f->n, f->r) < LEFT ||
+    if (!(PetscAbsReal(slope) > LEFT_DERIVATIVE * size) || FitSize(f->n, f->r) < LEFT_DERIVATIVE ||
         !(slope > 0 ? f->x[p] <= 0 : f->x[p] >= 1))
       continue;
     ++*n;
     for (PetscInt k = 0; k < f->n; k++) A[k * f->n_par + p] = 0;
   }
   PetscCall(HycoSingularValues(f->n_par, f->n, A, s)); /* of its transpose: by columns */
-  for (PetscInt k = 0; k < most && s[k] > LEFT * s[0]; k++) ++*n;
+  for (PetscInt k = 0; k < most && s[k] > LEFT_DERIVATIVE * s[0]; k++) ++*n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -257,8 +257,7 @@ static PetscReal ROMFloatingEvaluate(const Dual *d, const PetscReal c[], PetscRe
 }
 
 #define ITERATIONS 30
-#define BALANCED   1e-12 /* relative to the largest work */
-#define ACTS       1e-10 /* directions of c with less curvature, relative, are those in which no contact acts */
+#define MET        1e-12 /* of the largest work: 4500 eps, sums over all contacts */
 
 /* Minimises the dual function from c = 0. *met: the works agree. Newton's method with Armijo's line search (Nocedal
    and Wright, Numerical Optimization, algorithm 3.1): the dual of an entropy is convex and smooth, and has no
@@ -277,10 +276,10 @@ static PetscErrorCode ROMFloatingMinimise(const Dual *d, PetscReal c[], PetscBoo
     PetscReal most = 0, slope = 0, t = 1, next;
 
     for (PetscInt i = 0; i < p; i++) most = PetscMax(most, PetscAbsReal(gradient[i]));
-    *met = (PetscBool)(most <= BALANCED * size);
+    *met = (PetscBool)(most <= MET * size);
     if (*met) break;
     /* Singular where contacts do not act on a motion: the step has no part in it. */
-    PetscCall(HycoPseudoInverse(p, p, hessian, ACTS, inverse));
+    PetscCall(HycoPseudoInverse(p, p, hessian, HYCO_RANK, inverse));
     for (PetscInt i = 0; i < p; i++) {
       step[i] = 0;
       for (PetscInt j = 0; j < p; j++) step[i] -= inverse[j * p + i] * gradient[j];

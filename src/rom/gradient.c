@@ -323,7 +323,7 @@ static PetscBool MasterChanges(const Work *o, const HycoDifference *d, PetscBool
   for (PetscInt j = 0; j < o->k; j++) {
     const PetscInt at = o->p + o->contact[j];
 
-    if (o->z[at] > HYCO_GRADIENT_FORCE * most)
+    if (o->z[at] > HYCO_UNDECIDED * most)
       slope = PetscMax(slope, PetscAbsReal((o->w[1][at] - o->w[0][at]) / d->step[1]));
   }
   for (PetscInt j = 0; j < o->k; j++) {
@@ -332,7 +332,7 @@ static PetscBool MasterChanges(const Work *o, const HycoDifference *d, PetscBool
     PetscReal jump;
 
     /* A contact without force has no part in the solution, whatever its gap does. */
-    if (PetscAbsReal(o->z[at]) <= HYCO_GRADIENT_FORCE * most) continue;
+    if (PetscAbsReal(o->z[at]) <= HYCO_UNDECIDED * most) continue;
     jump = HycoDifferenceJump(d, o->size, slope, v);
     if (closer ? HycoDifferenceKinks(d, jump, near) : jump > 0) return PETSC_TRUE;
   }

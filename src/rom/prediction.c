@@ -56,7 +56,7 @@ static void SumForces(HycoROM m, HycoPrediction *p)
   }
   for (PetscInt i = 0; i < n; i++) {
     /* The threshold needs the largest force: a second loop. */
-    const PetscInt k = m->spread ? i : m->contact[i], presses = m->Lambda[k] > HYCO_PRESSES * p->lambda_max;
+    const PetscInt k = m->spread ? i : m->contact[i], presses = m->Lambda[k] > HYCO_FORCE_ROUND_OFF * p->lambda_max;
 
     p->n_active += presses;
     if (m->model->in_rid[k]) p->n_rid_active += presses;

@@ -93,7 +93,7 @@ PetscErrorCode HycoTraceMeasure(HycoROM m, HycoStep *s)
     s->lambda_max = PetscMax(s->lambda_max, m->Lambda[k]);
   }
   /* After the largest is known: a force of round-off is not active. */
-  for (PetscInt k = 0; k < m->model->pairs.n; k++) s->n_active += m->Lambda[k] > HYCO_PRESSES * s->lambda_max;
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) s->n_active += m->Lambda[k] > HYCO_FORCE_ROUND_OFF * s->lambda_max;
   PetscCall(ISGetLocalSize(m->model->rid, &n));
   PetscCall(ISGetIndices(m->model->rid, &node));
   for (PetscInt k = 0; k < n * dim; k++) s->u_norm2 += PetscSqr(m->U[node[k / dim] * dim + k % dim]);
@@ -291,9 +291,8 @@ PetscErrorCode HycoROMSetSteps(HycoROM m, PetscInt n, const PetscReal t[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define JUDGED_CUTS                                                                                                    \
-  16 /* limit of halved steps when training judges a model, which otherwise could take minutes to                      \
-        fail */
+/* Limit of halved steps when training judges a model, which otherwise could take minutes to fail. */
+#define JUDGED_CUTS 16
 
 /* A path that needs many more steps than full order is a failure of the model, which judging it need not follow to
    its end. */

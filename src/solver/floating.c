@@ -8,8 +8,8 @@
 #include <hycoalgorithms.h>
 #include <hycosolverimpl.h>
 
-#define LEFT     1e-6  /* of the square of a motion: below, nothing is left of it */
-#define ROUNDING 1e-12 /* of all loads: below, their work on the motions is round-off */
+/* Of the square of a motion, what forces leave of it: 0.1 % of its length; less is none. */
+#define SLIDES_LEFT 1e-6
 
 /* Adds normal forces to the forces r that come nearest to the load f, so that the rest f - A r is a motion along which
    no contact opens: the one by which the bodies slide. First of all contacts, then, if that leaves nothing, of those
@@ -24,7 +24,7 @@ PetscErrorCode HycoBlocksLeaveSlide(const HycoBlocks *blocks, PetscInt p, const 
   PetscCall(PetscArraycpy(rest, f, p));
   for (PetscInt j = 0; j < blocks->row[blocks->n] * p; j++) rest[j % p] -= A[j] * r[j / p];
   for (PetscInt i = 0; i < p; i++) size += rest[i] * rest[i];
-  for (PetscInt pass = 0; pass < 2 && !(slide > LEFT * size); pass++) {
+  for (PetscInt pass = 0; pass < 2 && !(slide > SLIDES_LEFT * size); pass++) {
     PetscCall(PetscArrayzero(gram, p * p));
     for (PetscInt k = 0; k < blocks->n; k++) {
       const PetscReal *a = A + blocks->row[k] * p;
@@ -41,7 +41,7 @@ PetscErrorCode HycoBlocksLeaveSlide(const HycoBlocks *blocks, PetscInt p, const 
       for (PetscInt j = 0; j < p; j++) left -= gram[i * p + j] * x[j];
       slide += left * left;
     }
-    for (PetscInt k = 0; k < blocks->n && slide > LEFT * size; k++) {
+    for (PetscInt k = 0; k < blocks->n && slide > SLIDES_LEFT * size; k++) {
       PetscReal *own = r + blocks->row[k];
 
       PetscReal more = 0;
@@ -93,7 +93,7 @@ static PetscErrorCode SolverFloatingLiftOff(HycoSystem y, PetscInt p, const Vec 
   PetscCall(HycoMotionRows(y->B, p, z, y->work_L, A));
   for (PetscInt i = 0; i < p; i++) PetscCall(VecDot(y->F, z[i], &f[i]));
   PetscCall(VecNorm(y->F, NORM_1, &all));
-  PetscCall(HycoNormalsBalance(p, y->m, A, f, ROUNDING * all, row, &exists));
+  PetscCall(HycoNormalsBalance(p, y->m, A, f, HYCO_LOADS_ROUND_OFF * all, row, &exists));
   *lift_off = (PetscBool)!exists;
   PetscCall(VecGetOwnershipRange(L, &lo, &hi));
   if (*lift_off) PetscCall(HycoVecWrite(L, hi - lo, row + lo));

@@ -2,7 +2,7 @@
    round-off is too large; otherwise MUMPS's, which also gives the flexibility. */
 #include <hycosolverimpl.h>
 
-/* A residual below this share of F needs no refinement: the tolerance of the residuals is 1e-8. */
+/* Of F, the residual of a solve: a hundredth of the tolerance of 1e-8; less needs no refinement. */
 #define REFINE 1e-10
 
 /* The members of the solver's struct; the struct itself is part of the solver. */

@@ -315,7 +315,9 @@ static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, Vec diagonal, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define FAR 1e-9 /* a residual relative to the forces that a floating body's x may leave: it moves without any */
+/* Of the forces, a floating body's residual: a tenth of the tolerance of 1e-8; more is tested for the round-off of all
+   terms of a row, because the body moves without any force. */
+#define FLOATING_RESIDUAL 1e-9
 
 /* The same by all terms of a row, which are more than the diagonal's: at most 4 eps sum |K_ij x_j|. Adds to *dropped.
    For K with a null space, whose x has no bound; each rank needs all of x. Collective. */
@@ -375,7 +377,7 @@ static PetscErrorCode SystemStationarity(HycoSystem s, Vec x, Vec L, PetscReal *
   PetscCall(VecNorm(Kx, NORM_2, &nr));
   size = PetscMax(PetscMin(nK, nB + nF), PetscMax(nB, nF));
   PetscCall(MatGetNullSpace(s->K, &kernel));
-  if (kernel && nr > FAR * size && nr < 1e-3 * size) {
+  if (kernel && nr > FLOATING_RESIDUAL * size && nr < 1e-3 * size) {
     PetscCall(DropTerms(s, x, Kx, &dropped));
     PetscCall(VecNorm(Kx, NORM_2, &nr));
   }

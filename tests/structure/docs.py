@@ -88,11 +88,29 @@ class Docs(unittest.TestCase):
         self.assertLessEqual(text('README.md').count('\n'), 90)
 
     def test_words(self):
-        """All documents together have at most 42,000 words, not counting what separates the cells of tables, nor pages made from the headers."""
+        """All documents together have at most 42,000 words, not counting what separates the cells of tables, nor pages made from the sources."""
         others = [os.path.join(SOURCE, name) for name in ('CHANGELOG.md', 'CONTRIBUTING.md', 'extensions/README.md', 'examples/ladder/README.md')]
         words = {path: sum(bool(re.search(r'\w', word)) for word in text(path).split()) for path in [*PAGES, *others]
-                 if os.sep + 'api' + os.sep not in path}
+                 if os.sep + 'api' + os.sep not in path and not path.endswith('tolerances.md')}
         self.assertLessEqual(sum(words.values()), 42000, words)
+
+    def test_tolerances(self):
+        """docs/decisions/tolerances.md is what scripts/tolerances makes; each #define with a fraction is on it with a reason, tests and scripts that it
+        names exist, and no value has one name in two files for one quantity."""
+        made = subprocess.run([sys.executable, os.path.join(SOURCE, 'scripts', 'tolerances'), '-'], capture_output=True, text=True, check=True).stdout
+        self.assertEqual(text('docs', 'decisions', 'tolerances.md'), made, 'run scripts/tolerances')
+        rows = [[cell.strip() for cell in re.split(r'(?<!\\)\|', row)[1:-1]] for row in made.splitlines() if row.startswith('| `')]
+        for row in rows:
+            self.assertTrue(row[-2] and len(row[-1].split()) > 1, row)
+            for name in re.findall(r'(?:tests|scripts)/[\w./-]*\w', row[-1]):
+                self.assertTrue(os.path.exists(os.path.join(SOURCE, name)), row)
+        sources = ''.join(re.sub(r'\\\n', ' ', text(name)) for folder in ('src', 'extensions', 'include')
+                          for name in glob.glob(os.path.join(SOURCE, folder, '**', '*.[ch]'), recursive=True))
+        defined = re.findall(r'^#define +(\w+) +\(?-?[\d.]+(?:\.\d*|e-\d+)', sources, re.M)
+        self.assertGreater(len(defined), 200)
+        self.assertLessEqual(set(defined), {row[0].strip('`') for row in rows})
+        same = [tuple(row[:4]) for row in rows if len(row) == 5]
+        self.assertEqual(len(same), len(set(same)), sorted(row for row in set(same) if same.count(row) > 1))
 
     def test_api(self):
         """docs/api is what scripts/api-pages makes of the headers, and has every function that they declare with a comment."""

@@ -2,7 +2,8 @@
 #include "../../surface_normals.h"
 #include "../../master_search.h"
 
-/* Share of a slave's facet: the largest tangential distance of a pair's nodes on moved nodes. */
+/* Of the slave's facet, the tangential distance of a pair's nodes beyond the drawn one: half, beyond which another node
+   is nearer. */
 #define HYCO_APART_SHARE 0.5
 
 /* Whether each slave node (except those that need none) has its own master at most `far` away. */

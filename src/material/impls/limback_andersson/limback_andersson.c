@@ -7,7 +7,7 @@
 #include <hycoflow.h>
 
 /* -- begin: in exported models too -- */
-#define GAS_CONSTANT 8.31446261815324 /* J / (mol K) */
+#define GAS_CONSTANT 8.31446261815324 /* J / (mol K): exact by definition of the SI */
 
 enum { LIMBACK_RATE, LIMBACK_FACTOR, LIMBACK_ACTIVATION, LIMBACK_MODULUS, LIMBACK_N_CONSTANTS };
 

@@ -3,9 +3,7 @@
 #include <hycotrainers.h>
 #include <string.h>
 
-#define ACTIVE  0.3 /* assumed share of closed contacts, and entries of a row of B, for costs */
 #define ENTRIES 15
-#define USELESS 0.5 /* mean error of the training displacements along paths */
 
 /* Defaults are those that docs/options.md lists; of_history[] are refused where they could do nothing. */
 static PetscErrorCode SetFromOptions(HycoReducer t)
@@ -169,9 +167,9 @@ static PetscErrorCode CheckPath(HycoROM m, HycoReducer t)
   PetscFunctionBegin;
   PetscCall(MeanError(m, t, &mean));
   /* Negated, so that a NaN is refused too. */
-  if (!(mean < USELESS)) HycoReducerNameWorst(t, worst);
+  if (!(mean < HYCO_USELESS_ERROR)) HycoReducerNameWorst(t, worst);
   HycoCheckModel(
-      mean < USELESS,
+      mean < HYCO_USELESS_ERROR,
       "the model of bodies misses its own training displacements by %.0f %% on average (%d inelastic modes, "
       "%d points)%s: use more points (-hyco_bodies_cells), fewer modes (-hyco_bodies_inelastic_tol), or train "
       "a hybrid model",
@@ -256,7 +254,7 @@ static PetscErrorCode BodiesTrainerReport(HycoReducer t, HycoROM m, HycoTraining
    the model's mesh. */
 static PetscReal BodiesTrainerCost(HycoReducer t, const HycoAttempt *a)
 {
-  const PetscReal active = ACTIVE * (PetscReal)t->sizes[2], row = ENTRIES * active;
+  const PetscReal active = HYCO_ASSUMED_CLOSED * (PetscReal)t->sizes[2], row = ENTRIES * active;
 
   if (t->scene->n_times) return PathCost(t);
   return row * row + active * active * active / 3 + 2 * (PetscReal)a->n_modes * (PetscReal)a->rid_nodes * t->sizes[3];

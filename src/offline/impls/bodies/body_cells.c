@@ -10,7 +10,9 @@
 
 #define MOST_INNER   2400 /* unknowns: a row and a solve each */
 #define MOST_NUMBERS 6e6  /* of their rows in the file */
-#define LEAST_SCORE  0.1
+/* Score of a cell as a share of the highest, down to which cells get rows of their own: cells with the largest stress
+   have more. */
+#define LEAST_SCORE 0.1
 
 /* A cell's score is the largest share of its body's stress over all samples: the cells of large stress are those whose
    outputs matter, and get exact displacements first. */

@@ -7,7 +7,8 @@
 #include <hycobodiestraining.h>
 #include <string.h>
 
-#define KEPT 0.3 /* share of the memory for the factors of samples that are kept */
+/* Share of the memory for factors of samples that are kept: the rest is for snapshots and flexibilities. */
+#define KEPT_FACTORS 0.3
 
 /* Exact equality: theta comes from Node() each time, by the same operations, and a factor serves no other point. */
 static PetscBool BodyFactorsIsSame(PetscInt n, const PetscReal a[], const PetscReal b[])
@@ -228,7 +229,7 @@ static PetscErrorCode NextFactor(HycoBodiesFactor *factor, HycoBodyFactor *body)
   PetscCall(HycoFOMGetSolver(factor->fom, &solver));
   PetscCall(HycoSolverMemory(solver, &limit));
   for (PetscInt k = 0; k < factor->n; k++) bytes += factor->body[k].n_kept * factor->body[k].bytes;
-  if (body->n_kept && bytes > KEPT * limit) {
+  if (body->n_kept && bytes > KEPT_FACTORS * limit) {
     /* theta NULL: not factored, so that BodyFactorsRecall() does not find the old one while it is replaced. */
     PetscCall(PetscFree(body->kept[body->now].theta));
     PetscFunctionReturn(PETSC_SUCCESS);

@@ -8,24 +8,28 @@
 #include <hycobodiestraining.h>
 #include <petscblaslapack.h>
 
-#define MOST_NUMBERS 6e7  /* entries of the sampled displacements on all ranks */
-#define LEAST        20   /* samples */
-#define MOST_COLUMNS 600  /* of training paths */
-#define FULL         0.5  /* modes for each sample: with more of them the samples do not show all displacements */
-#define DOUBLINGS    4    /* of the samples then, */
-#define MISSED       2e-4 /* or, at most UNTIL_SEEN times, while the modes miss this share of the displacements at a */
-#define UNTIL_SEEN   2    /* check: the estimate of u is then above what the search takes as accurate enough */
-#define SPREAD       3    /* nodes of theta at which the displacements of each are computed */
-#define WITHIN                                                                                                         \
-  1e-2                 /* of the tolerance of the modes, for the displacements of which those of turning bodies are
-                             made */
-#define SMALL     1e-7 /* of the largest sample: smaller ones count as much as this */
-#define SCORED    24   /* displacements at all nodes of theta whose stresses show which cells matter */
-#define MANY      64   /* right-hand sides at once */
-#define SEEN      4    /* times of a path with friction whose forces are samples */
-#define SHORT     1e-7 /* of the largest response in a column: terms without larger entries are left out; */
-#define SHORTENED 0.1  /* share of MISSED that this and single precision may add */
-#define CHECKS    32   /* points at which the displacements that the modes miss are measured, no samples */
+#define MOST_NUMBERS 6e7 /* entries of the sampled displacements on all ranks */
+#define LEAST        20  /* samples */
+#define MOST_COLUMNS 600 /* of training paths */
+#define MOST_MODES   0.5 /* modes for each sample: with more of them the samples do not show all displacements */
+#define DOUBLINGS    4   /* of the samples with more modes */
+/* Of the displacements at a check, what modes may miss before the samples double, at most UNTIL_SEEN times: a fifth of
+   the 0.1 % that the search takes as accurate enough. */
+#define MISSED     2e-4
+#define UNTIL_SEEN 2 /* doublings while the modes miss more than MISSED */
+#define SPREAD     3 /* nodes of theta at which the displacements of each are computed */
+/* Of the modes' tolerance, for the displacements of which those of turning bodies are made: a hundredth, so that the
+   first compression does not decide. */
+#define TURNED_SHARE 1e-2
+/* Of the largest sample: smaller ones count as much as this; single precision of the stored responses. */
+#define LEAST_SAMPLE 1e-7
+#define SCORED       24 /* displacements at all nodes of theta whose stresses show which cells matter */
+#define MANY         64 /* right-hand sides at once */
+#define SEEN         4  /* times of a path with friction whose forces are samples */
+/* Of the largest response in a column: terms without larger entries are left out; single precision of the stored
+   responses. */
+#define SHORT_TERM 1e-7
+#define CHECKS     32 /* points at which the displacements that the modes miss are measured, no samples */
 
 /* Samples: the loads' coefficients and the surfaces' forces, a column each; the last n_checks are
    checks. */
@@ -554,7 +558,7 @@ static PetscErrorCode ScaleColumns(Mat S)
   PetscCall(MatDenseGetArray(S, &s));
   for (PetscInt k = 0; k < n; k++) {
     /* Not those of round-off: scaled to 1 they would be modes of noise. */
-    const PetscReal scale = most > 0 ? 1 / PetscMax(norm[k], SMALL * most) : 0;
+    const PetscReal scale = most > 0 ? 1 / PetscMax(norm[k], LEAST_SAMPLE * most) : 0;
 
     for (PetscInt i = 0; i < rows; i++) s[(size_t)k * (size_t)lda + (size_t)i] *= scale;
   }
@@ -581,7 +585,7 @@ static PetscErrorCode BodyFieldsCompress(HycoReducer t, const HycoBodiesFactor *
   PetscCall(ScaleColumns(S));
   PetscCall(MatNorm(S, NORM_FROBENIUS, &norm));
   *count = 0;
-  if (norm > 0) PetscCall(HycoReducerPOD(t, S, WITHIN * HycoTrainingOfBodies(t)->pod_tol, 0, &W, count, sigma));
+  if (norm > 0) PetscCall(HycoReducerPOD(t, S, TURNED_SHARE * HycoTrainingOfBodies(t)->pod_tol, 0, &W, count, sigma));
   PetscCall(MatDestroy(&S));
   PetscCall(PetscMalloc1(n_dof * (size_t)*count + 1, few));
   for (PetscInt k = 0; k < *count; k++) {
@@ -1008,7 +1012,7 @@ static PetscErrorCode StoreCoefficients(HycoReducer t, const HycoBodiesFactor *f
     PetscReal added = 0;
 
     PetscCall(TakeLoads(b, s, &own[k]));
-    PetscCall(TakeResponses(s, &own[k], s->n_samples > 1 ? SHORT : 0));
+    PetscCall(TakeResponses(s, &own[k], s->n_samples > 1 ? SHORT_TERM : 0));
     if (s->n_samples == 1) continue;
     /* Between the samples, and at the ends of the ranges, where polynomials are largest. */
     PetscCall(StoredError(b, k, &own[k], sampled, factor->between, &added));
@@ -1016,7 +1020,7 @@ static PetscErrorCode StoreCoefficients(HycoReducer t, const HycoBodiesFactor *f
       HycoBodiesPoint(t, end ? HycoBodiesGrid(b, 0, NULL) - 1 : 0, theta);
       PetscCall(StoredError(b, k, &own[k], sampled, theta, &added));
     }
-    if (added > SHORTENED * MISSED) {
+    if (added > HYCO_SHORTENED * MISSED) {
       PetscCall(TakeResponses(s, &own[k], 0));
       added = 0;
     }
@@ -1205,7 +1209,7 @@ static PetscErrorCode ModesOf(HycoReducer t, HycoSnapshots store, HycoBodiesFact
   /* If the modes are nearly as many as the samples, further samples would give further modes. */
   *enough = PETSC_TRUE;
   for (PetscInt k = 0; k < b->n; k++)
-    *enough = (PetscBool)(*enough && b->mode_start[k + 1] - b->mode_start[k] <= FULL * sampled->expanded);
+    *enough = (PetscBool)(*enough && b->mode_start[k + 1] - b->mode_start[k] <= MOST_MODES * sampled->expanded);
   HycoTrainingOfBodies(t)->filled = (PetscBool) !*enough;
   /* What modes miss at the checks is doubled for at most a few times: geometry parameters may never be spanned. */
   if (sampled->n_checks && doubled < UNTIL_SEEN) *enough = (PetscBool)(*enough && b->left <= BodyFieldsMissedShare(t));

@@ -8,12 +8,14 @@
 #include <hycobodiestraining.h>
 #include <petscblaslapack.h>
 
-#define MOST_VALUES 17    /* of a parameter, */
-#define MOST_POINTS 400   /* and in all */
-#define EXACT       1e-13 /* difference at which the table has all digits, relative to the largest number of its kind */
-#define ROUGH       1e-8  /* and at which it is refused: equilibrium would miss as much */
-#define NONE        1e-13 /* share of its terms below which a moment of a load is round-off */
-#define FAR         1e4   /* largest coefficient of a motion that moves a pin by 1, beside a body's size */
+#define MOST_VALUES 17  /* of a parameter, */
+#define MOST_POINTS 400 /* and in all */
+/* Of the largest number of its kind, the table's error: 450 eps, a polynomial of 17 values; no more values are tried.
+   */
+#define TABLE_EXACT 1e-13
+/* Of the largest number of its kind, the table's error: equilibrium would miss as much, and its residual is 1e-8. */
+#define TABLE_ROUGH 1e-8
+#define FAR         1e4 /* largest coefficient of a motion that moves a pin by 1, beside a body's size */
 
 /* Whether body k has a part in the table. */
 static PetscBool BodyMotionsVaries(HycoSubstructures b, const HycoBodiesFactor *factor, PetscInt k)
@@ -119,7 +121,7 @@ static PetscErrorCode TakeMoments(HycoSubstructures b, HycoBodiesFactor *factor,
   }
   HycoAllreduce(row, n, MPIU_REAL, MPI_SUM, HycoComm(factor->fom));
   HycoAllreduce(terms, n, MPIU_REAL, MPI_SUM, HycoComm(factor->fom));
-  for (PetscInt i = 0; i < n; i++) row[i] = PetscAbsReal(row[i]) > NONE * terms[i] ? row[i] : 0;
+  for (PetscInt i = 0; i < n; i++) row[i] = PetscAbsReal(row[i]) > HYCO_WORK_ROUND_OFF * terms[i] ? row[i] : 0;
   PetscCall(PetscFree(terms));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -267,7 +269,7 @@ static PetscErrorCode RefineTable(HycoReducer t, HycoBodiesFactor *factor)
 
       PetscCall(DirectionError(t, factor, p, &e[p]));
       most = PetscMax(most, e[p]);
-      if (e[p] <= EXACT || n >= MOST_VALUES || all / n * (2 * n - 1) > MOST_POINTS) continue;
+      if (e[p] <= TABLE_EXACT || n >= MOST_VALUES || all / n * (2 * n - 1) > MOST_POINTS) continue;
       if (worst < 0 || e[p] > e[worst]) worst = p;
     }
     if (worst >= 0) {
@@ -278,7 +280,7 @@ static PetscErrorCode RefineTable(HycoReducer t, HycoBodiesFactor *factor)
     }
   } while (worst >= 0);
   HycoCheckModel(
-      most <= ROUGH,
+      most <= TABLE_ROUGH,
       "the rigid motions of a body that contact alone holds cannot be interpolated over the parameters of its "
       "shape (relative error %.2g); train a hybrid model",
       (double)most);

@@ -9,13 +9,14 @@
 #include <petscblaslapack.h>
 
 #define MOST_VALUES 17
-#define HOPELESS    0.3 /* e above which the model is refused */
-#define ITERATIONS  30  /* of the power method */
-/* More samples than HYCO_BODIES_SAMPLES make predictions slower. They are added while e is above ENOUGH: */
-#define ENOUGH       1e-4
-#define MOST_CHEAP   500 /* at most so many, */
-#define MOST_NUMBERS 2e7 /* and of so many numbers of their flexibilities */
-#define SHORTENED    0.1 /* share of the tolerance that left out terms and single precision may add to e */
+/* Of the flexibility, e at held-out samples: above it the model is refused, since forces may be wrong by a third. */
+#define MOST_ERROR 0.3
+#define ITERATIONS 30 /* of the power method */
+/* Of the flexibility, e at held-out samples: below it no more samples than HYCO_BODIES_SAMPLES are added, which make
+   predictions slower; a tenth of the 0.1 % of accurate models. */
+#define SMALL_ERROR  1e-4
+#define MOST_CHEAP   500 /* samples, where they are cheap; */
+#define MOST_NUMBERS 2e7 /* numbers of their flexibilities, at most */
 
 /* Node k of n along parameter p, in its own variable. Chebyshev points of the second kind (extrema), nested when their
    number n goes to 2 n - 1: former samples stay. Ends exactly, without round-off. */
@@ -355,13 +356,13 @@ static PetscInt BodySamplesWorst(HycoReducer t, HycoSubstructures b, const Petsc
   for (PetscInt p = 0; p < b->n_theta; p++) {
     const PetscInt finer = 2 * b->n_nodes[p] - 1, n = HycoBodiesGrid(b, 0, NULL) / b->n_nodes[p] * finer;
     const char *name = t->scene->parameter[b->theta[p]];
-    const PetscReal room = e[p] > ENOUGH / b->n_theta ? s->room : (PetscReal)s->most_samples;
+    const PetscReal room = e[p] > SMALL_ERROR / b->n_theta ? s->room : (PetscReal)s->most_samples;
     const PetscBool ends = (PetscBool)(finer > MOST_VALUES || n > room);
 
     /* The axes' errors add up: each may use its share of the tolerance. */
     if (e[p] <= s->tol / b->n_theta) continue;
     if (!ends && (worst < 0 || e[p] > e[worst])) worst = p;
-    if (!ends || e[p] <= most || (!s->limited && e[p] <= ENOUGH / b->n_theta)) continue;
+    if (!ends || e[p] <= most || (!s->limited && e[p] <= SMALL_ERROR / b->n_theta)) continue;
     most = e[p];
     if (finer > MOST_VALUES)
       snprintf(s->ended, sizeof(s->ended), "narrow the range of %s, of which %d values are not enough", name,
@@ -399,7 +400,7 @@ static PetscErrorCode BodySamplesStore(HycoReducer t, const HycoBodiesFactor *fa
       for (PetscInt side = 0; side < 2 && fine; side++) {
         PetscCall(BodySamplesBound(b, factor, &held[2 * p + side], PETSC_TRUE, &own));
         stored[p] = PetscMax(stored[p], own);
-        fine = (PetscBool)(own <= e[p] + SHORTENED * tol / b->n_theta);
+        fine = (PetscBool)(own <= e[p] + HYCO_SHORTENED * tol / b->n_theta);
       }
     }
     if (fine && ways[way].least > 0) PetscCall(PetscArraycpy(e, stored, b->n_theta));
@@ -430,7 +431,7 @@ static PetscErrorCode BodySamplesRefine(HycoReducer t, HycoBodiesFactor *factor,
   b->bound = 0;
   for (PetscInt p = 0; p < b->n_theta; p++) {
     b->bound += e[p];
-    HycoCheckModel(e[p] <= HOPELESS,
+    HycoCheckModel(e[p] <= MOST_ERROR,
                    "the flexibility of a body cannot be interpolated over %s: with %d values its relative error is "
                    "%.2g; %s, or train a hybrid model",
                    t->scene->parameter[b->theta[p]], (int)b->n_nodes[p], (double)e[p], HycoTrainingOfBodies(t)->ended);

@@ -7,12 +7,16 @@
 #include <hycoalgorithms.h>
 #include <hycobodiestraining.h>
 
-#define MOST_VECTORS 60    /* of the basis */
-#define INDEPENDENT  1e-12 /* share of the largest load: a smaller part outside the basis is round-off */
-#define COMPLETE     1e-9  /* the same, for the loads at further points; */
-#define SAMPLED      1e-6  /* where they change with the shape of bodies, which are sampled too */
-#define POINTS(p, q) (12 + 8 * (p) + 24 * (q))
-#define MORE         8 /* further points */
+#define MOST_VECTORS 60 /* of the basis */
+/* Of the largest load, what the basis leaves of one: 4500 eps, projections onto 60 vectors. */
+#define INDEPENDENT_LOAD 1e-12
+/* Of the largest load, what the basis leaves at further points: a tenth of the residual of 1e-8. */
+#define COMPLETE 1e-9
+/* Of the largest load, the same where it changes with the shape of bodies: a hundredth of SMALL_ERROR, as bodies are
+   sampled too. */
+#define COMPLETE_SAMPLED 1e-6
+#define POINTS(p, q)     (12 + 8 * (p) + 24 * (q))
+#define MORE             8 /* further points */
 
 /* F at mu in the bodies' axes, 0 where fixed. Collective. In the body's axes a load that moves with the body does not
    change, and needs one vector only. */
@@ -144,7 +148,7 @@ static PetscErrorCode AddPoint(HycoReducer t, HycoBodiesFactor *factor, Survey *
   PetscCall(VecNorm(F, NORM_2, &norm));
   s->size = PetscMax(s->size, norm);
   PetscCall(TakeOut(factor, F, &rest));
-  if (!check && rest > INDEPENDENT * s->size && rest > 1e-11 * norm && factor->n_basis < MOST_VECTORS) {
+  if (!check && rest > INDEPENDENT_LOAD * s->size && rest > 1e-11 * norm && factor->n_basis < MOST_VECTORS) {
     PetscCall(VecScale(F, 1 / rest));
     PetscCall(TakeOut(factor, F, &rest));
     PetscCall(VecScale(F, 1 / rest));
@@ -153,7 +157,7 @@ static PetscErrorCode AddPoint(HycoReducer t, HycoBodiesFactor *factor, Survey *
     factor->basis[factor->n_basis++] = F;
   }
   PetscCall(VecDestroy(&F));
-  HycoCheckModel(!check || rest <= (b->n_theta ? SAMPLED : COMPLETE) * s->size,
+  HycoCheckModel(!check || rest <= (b->n_theta ? COMPLETE_SAMPLED : COMPLETE) * s->size,
                  "a load changes its distribution on a body in too many ways as the parameters vary (%.1e of it is in "
                  "none of %d vectors), which a model of bodies does not support; train a hybrid model",
                  (double)(rest / s->size), (int)factor->n_basis);

@@ -8,9 +8,11 @@
 #include <hycobodiestraining.h>
 #include <string.h>
 
-#define SIMILAR 1e-11 /* relative residual of a map and of a stiffness: above it the body changes */
-#define SAME    1e-10 /* relative change below which a quantity is the same */
-#define JOINT   3     /* points at which all parameters change */
+/* Of a map or of a stiffness, its residual: 45,000 eps, expressions at thousands of nodes and a product with K; similar
+   ones have 1e-13 (tests/models/bodies.py). */
+#define SIMILAR       1e-11
+#define SAME_QUANTITY 1e-10 /* of a quantity, its change: ten times SIMILAR */
+#define JOINT         3     /* points at which all parameters change */
 
 /* -- the bodies -- */
 
@@ -260,10 +262,10 @@ static PetscInt RecogniseDifferences(const Compared *c, PetscInt k)
   /* Not similar in nodes or stiffness: the other ways have no meaning then. */
   if (pose->residual > SIMILAR || c->off[k] > SIMILAR || !(c->kappa[k] > 0)) return HYCO_ENTERS_SHAPE;
   for (PetscInt d = 0; d < 9; d++) turned = PetscMax(turned, PetscAbsReal(pose->Q[d] - (d % 4 == 0)));
-  if (turned > SAME) ways |= HYCO_ENTERS_PLACE;
-  if (PetscAbsReal(pose->s - 1) > SAME) ways |= HYCO_ENTERS_SIZE;
-  if (PetscAbsReal(c->kappa[k] / scaled - 1) > SAME) ways |= HYCO_ENTERS_FACTOR;
-  if (PetscMin(c->load[2 * k], c->load[2 * k + 1]) > SAME) ways |= HYCO_ENTERS_LOADS;
+  if (turned > SAME_QUANTITY) ways |= HYCO_ENTERS_PLACE;
+  if (PetscAbsReal(pose->s - 1) > SAME_QUANTITY) ways |= HYCO_ENTERS_SIZE;
+  if (PetscAbsReal(c->kappa[k] / scaled - 1) > SAME_QUANTITY) ways |= HYCO_ENTERS_FACTOR;
+  if (PetscMin(c->load[2 * k], c->load[2 * k + 1]) > SAME_QUANTITY) ways |= HYCO_ENTERS_LOADS;
   return ways;
 }
 
@@ -302,7 +304,7 @@ static PetscErrorCode StaysBehind(const Compared *c, const HycoFixed *fixed, Pet
     size[0] += now[d] * now[d];
     size[1] += turned[d] * turned[d];
   }
-  *stays = (PetscBool)(PetscAbsReal(along) < (1 - SAME) * PetscSqrtReal(size[0] * size[1]));
+  *stays = (PetscBool)(PetscAbsReal(along) < (1 - SAME_QUANTITY) * PetscSqrtReal(size[0] * size[1]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

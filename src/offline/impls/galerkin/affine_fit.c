@@ -6,10 +6,11 @@
 #include <hycogalerkintraining.h>
 #include <hycotable.h>
 
-#define MOST     5       /* largest number of values of one parameter */
-#define ENTRIES  5000000 /* largest number of entries in the table: 40 MB */
-#define AGREES   1e-12   /* tolerance, as a share of the largest entry of a row */
-#define N_CHECKS 3
+#define MOST    5       /* largest number of values of one parameter */
+#define ENTRIES 5000000 /* largest number of entries in the table: 40 MB */
+/* Of the largest entry of a row: 4500 eps, an interpolated table against the assembly. */
+#define TABLE_AGREES 1e-12
+#define N_CHECKS     3
 
 /* The assembled matrix at mu. */
 static PetscErrorCode AffineFitSample(HycoROM m, const PetscReal mu[], PetscInt entries, PetscReal value[])
@@ -44,7 +45,7 @@ static PetscErrorCode AffineFitAgrees(HycoROM m, HycoTable t, const PetscReal mu
   for (PetscInt k = 0; k < entries; k++) largest[row[k]] = PetscMax(largest[row[k]], PetscAbsReal(here[k]));
   *agrees = PETSC_TRUE;
   for (PetscInt k = 0; k < entries; k++)
-    *agrees = (PetscBool)(*agrees && PetscAbsReal(here[k] - there[k]) <= AGREES * largest[row[k]]);
+    *agrees = (PetscBool)(*agrees && PetscAbsReal(here[k] - there[k]) <= TABLE_AGREES * largest[row[k]]);
   PetscCall(PetscFree3(here, there, largest));
   PetscCall(PetscFree(row));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -228,7 +228,8 @@ typedef struct {
   PetscReal u, lambda, rank;
 } Verdict;
 
-#define SAME 1e-6 /* relative difference of equal errors */
+/* Of an error: solves with a residual of 1e-8 may be in another order on other numbers of ranks. */
+#define SAME_ERROR 1e-6
 
 /* most: a mean error of u above it is of no interest. */
 static PetscErrorCode JudgeSet(HycoReducer t, HycoROM m, PetscInt n, const PetscInt dof[], PetscReal most, Verdict *v)
@@ -246,8 +247,8 @@ static PetscErrorCode JudgeSet(HycoReducer t, HycoROM m, PetscInt n, const Petsc
 /* Of equal errors the better conditioned, so that round-off does not choose. */
 static PetscBool FullOrderUnknownsBetter(const Verdict *a, const Verdict *b)
 {
-  if (a->u < b->u * (1 - SAME)) return PETSC_TRUE;
-  return (PetscBool)(a->u <= b->u * (1 + SAME) && a->rank > b->rank * (1 + SAME));
+  if (a->u < b->u * (1 - SAME_ERROR)) return PETSC_TRUE;
+  return (PetscBool)(a->u <= b->u * (1 + SAME_ERROR) && a->rank > b->rank * (1 + SAME_ERROR));
 }
 
 /* Exchanges one of n full-order unknowns for one of N candidates while the error decreases. chosen[k]: candidate k is
@@ -288,7 +289,7 @@ static PetscErrorCode FullOrderUnknownsExchange(HycoReducer t, HycoROM m, PetscI
           seen[n_seen++] = hash;
           PetscCall(HycoReducerTell(t, "choices of full-order displacements", trials, limit));
           trials++;
-          PetscCall(JudgeSet(t, m, n, dof, round.u * (1 + SAME), &verdict));
+          PetscCall(JudgeSet(t, m, n, dof, round.u * (1 + SAME_ERROR), &verdict));
           if (FullOrderUnknownsBetter(&verdict, &round)) {
             round = verdict;
             out = i;
@@ -416,10 +417,8 @@ static PetscErrorCode FreeUnknowns(HycoReducer t, HycoROM m, PetscBool contact_o
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define USELESS 0.5 /* mean training error from which a model is refused */
-#define LOST                                                                                                           \
-  3 /* number of successive worse ridges that end the race of paths: above the best the errors grow                    \
-       with the ridge */
+/* Number of successive worse ridges that end the race of paths: above the best the errors grow with the ridge. */
+#define LOST 3
 
 /* The ridge for paths: each trial takes seconds, and some of the paths suffice to reject a ridge that is worse than
    the best. Fails if an attempt of the search has training errors of one half with any ridge. */
@@ -439,8 +438,8 @@ static PetscErrorCode EarlyStopRidges(HycoReducer t, HycoROM m, PetscReal *stren
 
     /* A new regression of the modes on A's unknowns; the reduced matrix follows. */
     PetscCall(HycoGalerkinSetRidge(m, ridge));
-    PetscCall(
-        HycoReducerJudgeEarlyStop(t, m, any ? its : NULL, t->trying ? USELESS : PETSC_INFINITY, judged, &u, &lost));
+    PetscCall(HycoReducerJudgeEarlyStop(t, m, any ? its : NULL, t->trying ? HYCO_USELESS_ERROR : PETSC_INFINITY, judged,
+                                        &u, &lost));
     /* Errors have one minimum over the ridge as a rule: after LOST worse ones in a row the search ends. */
     in_a_row += any;
     if (lost || !(u < least)) continue;

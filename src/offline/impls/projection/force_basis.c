@@ -62,8 +62,7 @@ static PetscBool ForceBasisIsOffered(HycoReducer t, PetscBool targets, size_t le
   return targets;
 }
 
-/* Supremizers of unit length: a smaller share outside the modes is round-off. */
-#define NEW 1e-8
+#define NEW_SUPREMIZER 1e-8 /* of a supremizer's length 1, what is outside the modes: the square root of eps */
 
 /* X -= V V^T X twice. */
 static PetscErrorCode RemoveModes(HycoReducer t, Mat X)
@@ -166,7 +165,7 @@ static PetscErrorCode ForceBasisEnrich(HycoReducer t)
   PetscCall(PetscMalloc1(t->n_s + 1, &size));
   PetscCall(HycoReducerPOD(t, X, 0, 0, &Q, &found, size));
   /* Columns had unit length: singular values are shares. */
-  while (q < found && size[q] > NEW * PetscMax(1, size[0])) q++;
+  while (q < found && size[q] > NEW_SUPREMIZER * PetscMax(1, size[0])) q++;
   PetscCall(PetscFree(size));
   PetscCall(MatDestroy(&X));
   ((HycoForceBasis)t->training)->n_supremizers = q;

@@ -10,8 +10,9 @@
 
 /* The estimate of u over what the modes miss at the checks: a response that no sample has is missed ten times as much
    as the worst of some tens of points. */
-#define BEYOND   10
-#define ROUNDING 1e-10 /* relative, of exact results */
+#define BEYOND 10
+/* Of the results, the estimate of exact ones: the residual of solves, 1e-8 at most and 1e-10 as a rule. */
+#define EXACT_ERROR 1e-10
 
 /* HycoROMSetUpDefault() makes fe and rows, which the surface borrows. */
 static PetscErrorCode SetUp(HycoROM m)
@@ -43,11 +44,9 @@ PetscErrorCode HycoBodiesDestroyModel(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define ROUNDED 1e-6 /* most of a residual that may be the effect of rounding */
-
 /* What is left of the gap of contact k; *rounding: the effect of rounding the terms whose sum the displacements are,
-   since a body on a soft spring moves far without contact and is pushed back as far. At most ROUNDED of `gaps`: more is
-   an error. */
+   since a body on a soft spring moves far without contact and is pushed back as far. At most HYCO_GAP_ROUND_OFF of
+   `gaps`: more is an error. */
 static PetscReal BodiesRemainingGap(HycoROM m, PetscInt k, PetscReal gaps, PetscReal *rounding)
 {
   const HycoBodiesWork o = (HycoBodiesWork)m->work;
@@ -59,7 +58,7 @@ static PetscReal BodiesRemainingGap(HycoROM m, PetscInt k, PetscReal gaps, Petsc
     /* free and the response to the forces may be huge and opposite, as their sum u is small. */
     terms += PetscAbsReal(o->row[j]) * (PetscAbsReal(o->free[at]) + PetscAbsReal(o->u[at] - o->free[at]));
   }
-  *rounding = PetscMin(HYCO_NOTHING * terms, ROUNDED * gaps);
+  *rounding = PetscMin(HYCO_NOTHING * terms, HYCO_GAP_ROUND_OFF * gaps);
   return m->rows.gap[k] - HycoROMAddRow(m, k, 0);
 }
 
@@ -192,11 +191,11 @@ static PetscErrorCode BodiesEstimate(HycoROM m, HycoPrediction *p)
   const HycoSubstructures b = (HycoSubstructures)m->model->data;
 
   PetscFunctionBegin;
-  p->estimated_error_lambda = PetscMax(p->interpolation_error, ROUNDING);
+  p->estimated_error_lambda = PetscMax(p->interpolation_error, EXACT_ERROR);
   if (b->n_theta && !m->model->estimates.n) /* errors of interpolated displacements are not known */
     PetscFunctionReturn(PETSC_SUCCESS);
-  p->estimated_error_u = PetscMax(BEYOND * b->left, ROUNDING);
-  if (b->ni && !b->n_theta) p->estimated_error_sigma = ROUNDING;
+  p->estimated_error_u = PetscMax(BEYOND * b->left, EXACT_ERROR);
+  if (b->ni && !b->n_theta) p->estimated_error_sigma = EXACT_ERROR;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

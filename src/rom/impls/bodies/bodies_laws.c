@@ -13,9 +13,6 @@
 #include <hycoentries.h>
 #include <petscblaslapack.h>
 
-#define CLOSED  1e-7 /* share of the largest force or gap below which a contact may open or close */
-#define CHANGES 1e-7 /* share of the largest rate: less is none */
-
 struct _n_HycoBodiesLaws {
   PetscInt n_taken, room, width; /* by accepted step: alpha, and without friction x and the forces */
   PetscReal *taken;
@@ -276,12 +273,13 @@ static PetscBool BodiesLawsStateStays(HycoROM m, const PetscReal q[], const Pets
   for (PetscInt k = 0; k < w->surface.n; k++) {
     PetscReal gap = q[p + k];
 
-    if (m->Lambda[k] > CLOSED * most || o->w[p + k] > CLOSED * o->size ||
+    if (m->Lambda[k] > HYCO_UNDECIDED * most || o->w[p + k] > HYCO_UNDECIDED * o->size ||
         w->bodies.row_start[k] == w->bodies.row_start[k + 1])
       continue;
     for (PetscInt d = 0; d < p; d++) gap -= w->G[k * p + d] * dz[d];
     for (PetscInt i = 0; i < w->n_set; i++) gap += w->column[w->set[i]][k] * dz[p + w->set[i]];
-    if (PetscAbsReal(dz[p + k]) > CHANGES * rate[0] || PetscAbsReal(gap) > CHANGES * rate[1]) return PETSC_FALSE;
+    if (PetscAbsReal(dz[p + k]) > HYCO_RATE_ROUND_OFF * rate[0] || PetscAbsReal(gap) > HYCO_RATE_ROUND_OFF * rate[1])
+      return PETSC_FALSE;
   }
   return PETSC_TRUE;
 }

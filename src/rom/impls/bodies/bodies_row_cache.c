@@ -5,7 +5,7 @@
 */
 #include <hycobodies.h>
 
-#define SAME       1e-14 /* of entries of B, which are no larger than 1 */
+#define SAME_ENTRY 1e-14 /* of 1, the largest entry of B: 45 eps, weights of one master found again */
 #define MOST_BYTES 1e9
 
 /* Whether the rows are the last ones. */
@@ -20,7 +20,7 @@ static PetscBool RowCacheIsSame(HycoBodiesWork o, PetscInt m)
   }
   for (PetscInt e = 0; e < o->row_start[m]; e++) {
     /* Values within round-off are the same: a point that is computed anew in the body's axes has other last digits. */
-    if (kept->at[e] != o->row_at[e] || PetscAbsReal(kept->value[e] - o->row[e]) > SAME) return PETSC_FALSE;
+    if (kept->at[e] != o->row_at[e] || PetscAbsReal(kept->value[e] - o->row[e]) > SAME_ENTRY) return PETSC_FALSE;
   }
   return PETSC_TRUE;
 }

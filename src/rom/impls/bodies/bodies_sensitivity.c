@@ -9,7 +9,7 @@
 #include <hycoentries.h>
 #include <hycolcp.h>
 
-#define RETURNED 1e-8 /* share of the forces by which those of the path are found again */
+#define RETURNED 1e-8 /* of the forces: their residual, 1e-8; a step solved again has those of the path */
 
 struct _n_HycoBodiesSensitivity {
   HycoRows rows;            /* beside the path, with tangents, */

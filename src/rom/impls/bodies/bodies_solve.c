@@ -10,13 +10,18 @@
 #include <petscblaslapack.h>
 #include <string.h>
 
-#define ROUNDS  60    /* of joining contacts */
-#define DEEP    0.5   /* share of the deepest penetration without forces */
-#define CLOSED  1e-13 /* share of the largest gap: smaller penetrations are round-off */
-#define NEAREST 0.1   /* share of the differences of depth, where all contacts are closed without forces */
-#define FLAT    1e-9  /* share of the depth: smaller differences are round-off */
-#define COARSE  4     /* one of so many contacts is in the first problem of bodies that contact alone holds */
-#define FEW     64    /* contacts that are all in it */
+#define ROUNDS 60 /* of joining contacts */
+/* Of the deepest penetration without forces: contacts that are deeper are in the first problem; half, as few rounds are
+   added by it (scripts/bench-online). */
+#define FIRST_DEPTH    0.5
+#define NO_PENETRATION 1e-13 /* of the largest gap: 450 eps, a row of B times the displacements */
+/* Of the differences of depth, where all contacts are closed without forces: the nearest tenth is in the first problem
+   (391 contacts, of which 9 to 87 closed, were all). */
+#define NEAREST_DEPTH 0.1
+/* Of the depth: 4.5e6 eps; smaller differences of depth do not choose the first problem. */
+#define FLAT_DEPTH 1e-9
+#define COARSE     4  /* one of so many contacts is in the first problem of bodies that contact alone holds */
+#define FEW        64 /* contacts that are all in it */
 
 /* `weight`, `share` and `blend` hold one array per body, and `bodies` has their number; the zeros afterwards make a
    second call, and HycoBodiesSetUp() on the same work, safe. */
@@ -366,11 +371,9 @@ static PetscErrorCode BodiesSolveLoad(HycoBodiesWork o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Shares of the loads below which their work, and what is left of it by the forces, is round-off: of the coefficients,
-   which carry that of the interpolation of the loads. */
-#define BALANCED 1e-11
-#define LEFT     1e-12
-#define ROUNDED  1e-13 /* the same of a work that is not small */
+/* Of the terms of a load's work, their sum: the coefficients carry the interpolation of the loads, whose residual is
+   INDEPENDENT_LOAD. */
+#define CANCELS 1e-11
 
 /* The work of the loads on motion i; 0 where vectors of the basis cancel, as it is of a load that does not act on
    it. */
@@ -385,7 +388,7 @@ PetscReal HycoBodiesLoadWork(HycoBodiesWork o, PetscInt i)
     sum += term;
     terms += PetscAbsReal(term);
   }
-  return PetscAbsReal(sum) > BALANCED * terms ? sum : 0;
+  return PetscAbsReal(sum) > CANCELS * terms ? sum : 0;
 }
 
 /* The round-off of these works: loads that balance themselves leave it beside the work of tiny ones. */
@@ -396,7 +399,7 @@ PetscReal HycoBodiesLoadRounding(HycoBodiesWork o)
 
   for (PetscInt j = 0; j < b->r; j++) all += PetscAbsReal(o->c[j]);
   for (PetscInt i = 0; i < b->p * b->r; i++) most = PetscMax(most, PetscAbsReal(o->work[i]));
-  return ROUNDED * most * all;
+  return HYCO_WORK_ROUND_OFF * most * all;
 }
 
 PetscBool HycoBodiesLoaded(HycoBodiesWork o)
@@ -822,7 +825,7 @@ static void BodiesSolveJoin(HycoBodiesWork o, const HycoBodiesSurface *s, PetscR
     /* An empty row is a contact without a master at this mu. */
     if (in[k] || o->row_start[k] == o->row_start[k + 1]) continue;
     for (PetscInt j = o->row_start[k]; j < o->row_start[k + 1]; j++) gap -= o->row[j] * o->u[o->row_at[j]];
-    if (gap >= -CLOSED * size) continue;
+    if (gap >= -NO_PENETRATION * size) continue;
     in[k] = *more = PETSC_TRUE;
     p->contact[p->n++] = k;
   }
@@ -852,10 +855,10 @@ static PetscErrorCode FirstDepth(HycoBodiesWork o, const HycoBodiesSurface *s, P
   for (PetscInt c = 0; c < n; c++) {
     const PetscReal spread = deepest[c] - shallowest[c];
 
-    least[c] = DEEP * deepest[c];
-    if (spread > FLAT * deepest[c] && shallowest[c] > least[c]) least[c] = deepest[c] - NEAREST * spread;
+    least[c] = FIRST_DEPTH * deepest[c];
+    if (spread > FLAT_DEPTH * deepest[c] && shallowest[c] > least[c]) least[c] = deepest[c] - NEAREST_DEPTH * spread;
     /* Penetration of round-off size must not choose the first contacts. */
-    least[c] = PetscMax(least[c], CLOSED * size);
+    least[c] = PetscMax(least[c], NO_PENETRATION * size);
   }
   HycoFreeAll(&shallowest, &deepest);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -1096,7 +1099,7 @@ PetscReal HycoBodiesUnbalanced(HycoBodiesWork o)
       size += PetscAbsReal(z * o->f[k]);
       reach = PetscMax(reach, PetscAbsReal(z));
     }
-    sum = PetscMax(PetscAbsReal(sum) - LEFT * reach * all, 0);
+    sum = PetscMax(PetscAbsReal(sum) - HYCO_LOADS_ROUND_OFF * reach * all, 0);
     if (size > 0) most = PetscMax(most, sum / size);
   }
   return most;
@@ -1122,12 +1125,10 @@ PetscReal HycoBodiesImbalance(HycoBodiesWork o)
       terms += PetscAbsReal(o->Z[k * b->p + i] * o->f[k]);
       reach = PetscMax(reach, PetscAbsReal(o->Z[k * b->p + i]));
     }
-    if (terms > LEFT * reach * all) most = PetscMax(most, PetscAbsReal(sum) / terms);
+    if (terms > HYCO_LOADS_ROUND_OFF * reach * all) most = PetscMax(most, PetscAbsReal(sum) / terms);
   }
   return most;
 }
-
-#define HOLDS 1e-10 /* share of the largest force below which a force is round-off */
 
 void HycoBodiesMotionRow(HycoBodiesWork o, PetscInt k, PetscReal g[])
 {
@@ -1150,7 +1151,7 @@ PetscErrorCode HycoBodiesFreeMotion(HycoBodiesWork o, PetscInt n, const PetscRea
   *loose = PETSC_FALSE;
   if (!p) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscCalloc3(p * p, &gram, p, &all, p, &g));
-  for (PetscInt k = 0; k < n; k++) least = PetscMax(least, HOLDS * Lambda[k]);
+  for (PetscInt k = 0; k < n; k++) least = PetscMax(least, HYCO_FORCE_ROUND_OFF * Lambda[k]);
   for (PetscInt k = 0; k < n; k++) {
     HycoBodiesMotionRow(o, k, g);
     for (PetscInt i = 0; i < p; i++) all[i] += g[i] * g[i];

@@ -12,8 +12,7 @@
 
 /* With more parameters a single prediction would cost more than a ramp gains. */
 #define MAX_LOADS 3
-/* F is the sum if the remainder is below this share of its largest entry. */
-#define AFFINE 1e-13
+#define AFFINE    1e-13 /* of a load's largest entry: 450 eps, the sum of up to eight loads */
 
 struct _n_HycoLoads {
   PetscInt n, parameter[MAX_LOADS];

@@ -12,7 +12,7 @@
 
 const char *const HycoReconstructSolvers[] = {"auto", "nnls", "tao", NULL};
 enum { SOLVER_AUTO, SOLVER_NNLS, SOLVER_TAO };
-#define RTOL 1e-8 /* tolerance of the optimality conditions, recomputed */
+#define RTOL 1e-8 /* of the optimality conditions of (41): the default of -hyco_solver_rtol */
 
 /* Explicit least squares: Lawson and Hanson's active set method, or TAO; with auto or tao the other one if the first
    does not converge. */
@@ -33,8 +33,9 @@ static PetscErrorCode ReconstructSolve(PetscInt solver, PetscInt m, PetscInt n, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The weight, relative to the largest snapshot force in the RID. */
-#define SMALL 1e-3
+/* Weight of the combination's norm relative to the largest snapshot force in the RID: it changes forces by 1e-6, its
+   square, and keeps round-off from choosing (tests/models/consistency.py). */
+#define LEAST_NORM_WEIGHT 1e-3
 
 /* Data that are constant over predictions, without the contacts whose force is zero in every snapshot. */
 struct _n_HycoReconstruction {
@@ -94,7 +95,8 @@ static PetscErrorCode SetUp(HycoROM m)
       r->S[(size_t)j * (size_t)r->n + (size_t)k] = h->S_lambda[(size_t)j * (size_t)N + (size_t)r->row[k]];
   }
   PetscCall(PetscMalloc4(r->n, &r->open, r->n, &r->d, r->n, &r->h, h->n_dual, &r->c));
-  PetscCall(HycoWeightedCreate(r->n, h->n_dual, r->S, SMALL * SMALL * r->scale * r->scale, &r->weighted));
+  PetscCall(HycoWeightedCreate(r->n, h->n_dual, r->S, LEAST_NORM_WEIGHT * LEAST_NORM_WEIGHT * r->scale * r->scale,
+                               &r->weighted));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -138,7 +140,7 @@ static PetscErrorCode SolveWrittenOut(HycoROM m, const PetscReal L[])
       if (r->open[k] < 0) a[row++] = r->open[k] * s[k];
     }
     /* The small weight on each coefficient, a row each. */
-    a[row + j] = SMALL * r->scale;
+    a[row + j] = LEAST_NORM_WEIGHT * r->scale;
   }
   PetscCall(ReconstructSolve(h->reconstruct_solver, rows, n, A, b, r->c));
   PetscCall(PetscFree2(A, b));

@@ -12,9 +12,9 @@
 #include <hycoromtypes.h>
 #include <petscviewer.h>
 
-/* Round-off of B V, relative to its largest terms: that of the snapshots over a mode's singular value, which
-   -hyco_pod_tol keeps above 1e-7 of the first. */
-#define ROUNDOFF 1e-8
+/* Of the largest terms of a row of B V: that of the snapshots over a mode's singular value, which -hyco_pod_tol keeps
+   above 1e-7 of the first. */
+#define GAP_OF_MODE 1e-8
 
 const char *const HycoDuals[] = {"fe", "nnmf", "snapshots", NULL};
 
@@ -31,7 +31,7 @@ static void DropRoundoff(HycoROM m, const PetscReal largest[], PetscScalar b[])
     for (PetscInt c = 0; c < m->m; c++)
       sum += p->V_lambda[(size_t)i * (size_t)m->model->pairs.n + (size_t)m->contact[c]];
     for (PetscInt j = 0; j < m->model->l; j++) {
-      if (PetscAbsScalar(b[j * p->l_lambda + i]) <= ROUNDOFF * sum * largest[j]) b[j * p->l_lambda + i] = 0;
+      if (PetscAbsScalar(b[j * p->l_lambda + i]) <= GAP_OF_MODE * sum * largest[j]) b[j * p->l_lambda + i] = 0;
     }
   }
 }

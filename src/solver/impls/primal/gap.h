@@ -4,7 +4,8 @@
 
 #include <hycosolverimpl.h>
 
-/* A larger share of contacts among the unknowns means an obstacle along a whole body. */
+/* Share of contacts among the unknowns, above which there is an obstacle along a whole body: a rope has a half, the
+   surface of a solid less than a tenth. */
 #define HYCO_MANY_SHARE 0.25
 
 /* Data of the form. */

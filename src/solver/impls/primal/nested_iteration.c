@@ -19,7 +19,7 @@
 #define HYCO_MAX_LEVELS 64
 /* Limit of iterations on a coarse level, which only gives an initial set. */
 #define HYCO_LEVEL_ITS 40
-/* A coupling is strong above this share of the row's largest. */
+/* Share of a row's largest coupling from which one is strong: the usual 0.25 of classical multigrid (Ruge, Stueben). */
 #define HYCO_STRONG 0.25
 
 typedef struct {

@@ -7,15 +7,17 @@
 #include "../primal/gap.h"
 #include <string.h>
 
-/* Accuracy of the first solves, and its factor after each converged set. */
-#define HYCO_FIRST   1e-3
+/* Of the loads, the residual of the first solves: the set changes at few contacts afterwards (tests/fom/iterative.py).
+   */
+#define HYCO_FIRST 1e-3
+/* Factor of the accuracy after each converged set: two rounds to HYCO_LAST (scripts/bench scale). */
 #define HYCO_SHARPEN 3e-4
-/* Accuracy of the final solves; increased if the residual requires it. */
+/* Of the loads, the residual of the final solves: a hundredth of the tolerance of 1e-8; increased if the recomputed
+   residual requires it. */
 #define HYCO_LAST  1e-10
-#define HYCO_LEAST 1e-15
-/* Violations that change the set, as a multiple of the accuracy; the least of them. */
+#define HYCO_LEAST 1e-15 /* of the loads, the least residual of solves: 4.5 eps, no solve is better */
+/* Violations that change the set, as a multiple of the accuracy; at least HYCO_SET_NOISE. */
 #define HYCO_BELIEVED 30
-#define HYCO_NOISE    1e-9
 
 /* Data of the form. */
 typedef struct {
@@ -190,7 +192,7 @@ static PetscErrorCode ProjectedViolations(void *ctx, const PetscBool active[], P
   const Run *p = (const Run *)ctx;
   const Projected *f = p->form;
   /* Coarse solves: a force of the size of their error has no sign. */
-  const PetscReal noise = PetscMax(HYCO_BELIEVED * p->accuracy, p->s->target > 0 ? 0 : HYCO_NOISE);
+  const PetscReal noise = PetscMax(HYCO_BELIEVED * p->accuracy, p->s->target > 0 ? 0 : HYCO_SET_NOISE);
   PetscReal size[2] = {0, 0}, sizes[2];
 
   PetscFunctionBegin;
