@@ -1,4 +1,4 @@
-"""docs/tutorial.md, docs/scenes.md and docs/faq.md, line by line: their files are written, their commands run, the output is compared."""
+"""docs/tutorial.md, docs/scenes.md, docs/bodies.md and docs/faq.md, line by line: their files are written, their commands run, the output is compared."""
 import glob
 import importlib.util
 import os
@@ -39,6 +39,10 @@ class Documents(unittest.TestCase):
     def test_faq(self):
         """The questions and answers."""
         self.run_page('faq.md', 8)
+
+    def test_bodies(self):
+        """The model of bodies by hand: its flexibility, forces and error at held-out samples are those that hyco prints."""
+        self.run_page('bodies.md', 2)
 
     def test_scenes(self):
         """The complete scene with which the page on scenes begins."""

@@ -83,6 +83,17 @@ class Docs(unittest.TestCase):
             for call in re.findall(r'`(\w+\()\)`', calls):
                 self.assertIn(call, sources, files)
 
+    def test_diagrams(self):
+        """docs/architecture.md: each function of the diagrams of a training and of a step in time is in the file beside it."""
+        diagrams = text('docs', 'architecture.md').split('## A training')[1].split('## Folders')[0]
+        found = re.findall(r'^ {4,}(\w+)\(\) +(\w+\.c)', diagrams, re.M)
+        self.assertGreater(len(found), 25)
+        for function, file in found:
+            path, *_ = glob.glob(os.path.join(SOURCE, 'src', '**', file), recursive=True) or [None]
+            self.assertTrue(path and re.search(rf'\b{function}\(', text(path)), (function, file))
+        for file in re.findall(r'\b\w+\.c\b', diagrams):
+            self.assertTrue(glob.glob(os.path.join(SOURCE, 'src', '**', file), recursive=True), file)
+
     def test_readme(self):
         """The README is short."""
         self.assertLessEqual(text('README.md').count('\n'), 90)
