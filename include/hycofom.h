@@ -87,17 +87,18 @@ typedef struct {
 
 /* The path of the last solve of a scene with a history. */
 typedef struct {
-  PetscInt n;             /* times that were reached */
-  const HycoStep *step;   /* n, borrowed until the next solve; if not ended, the last is not a listed time */
-  PetscBool ended;        /* the last listed time is reached */
-  PetscReal t;            /* the last accepted time */
-  const char *why;        /* if not ended: the message of the last attempt. Borrowed */
-  const char *newton;     /* "tangent" or "elastic" */
-  PetscReal factor_cost;  /* cost of a factor, in solves, by the rule of -hyco_newton auto */
-  PetscInt n_orders;      /* steps whose iterations gave an order of convergence */
-  PetscReal order;        /* the median of these; 2 for the tangent */
-  PetscInt n_taken;       /* number of accepted time steps, including the first time */
-  const PetscReal *taken; /* their ends. Borrowed */
+  PetscInt n;               /* times that were reached */
+  const HycoStep *step;     /* n, borrowed until the next solve; if not ended, the last is not a listed time */
+  PetscBool ended;          /* the last listed time is reached */
+  PetscReal t;              /* the last accepted time */
+  const char *why;          /* if not ended: the message of the last attempt. Borrowed */
+  PetscBool no_equilibrium; /* if not ended: no contact forces balance the loads, and shorter steps change nothing */
+  const char *newton;       /* "tangent" or "elastic" */
+  PetscReal factor_cost;    /* cost of a factor, in solves, by the rule of -hyco_newton auto */
+  PetscInt n_orders;        /* steps whose iterations gave an order of convergence */
+  PetscReal order;          /* the median of these; 2 for the tangent */
+  PetscInt n_taken;         /* number of accepted time steps, including the first time */
+  const PetscReal *taken;   /* their ends. Borrowed */
   /* of each output of the scene the largest (for `min` the smallest) over the listed times that were reached */
   PetscReal path_quantity[HYCO_MAX_QUANTITIES];
   PetscInt n_bound;     /* number of steps that only -hyco_step_inelastic kept from growing; since a resumption */

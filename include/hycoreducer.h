@@ -156,6 +156,8 @@ typedef struct {
   PetscReal cpu_solution; /* processor time of a full-order solution with its outputs, mean; 0: none was solved now */
   PetscReal cpu;          /* of the training up to the estimates, all ranks; solutions found in the store count as that
                              mean. 0: not known */
+  PetscInt n_lost;        /* points without an equilibrium, training and held-out; they are left out */
+  const char *first_lost; /* the first of them, its body, direction and time. Borrowed until the next run */
   PetscReal sliding;      /* the largest of all solutions, as in HycoSummary */
   PetscReal time_error;   /* the largest of the paths that were solved now, as in HycoHistory */
 } HycoTraining;

@@ -56,6 +56,8 @@ PetscErrorCode HycoSamplesOutsideTraining(HycoSamples samples, PetscInt first, P
 /* The points of `samples` that are not in `seen`, in their order. The caller owns *rest. Not collective. */
 PetscErrorCode HycoSamplesExcept(HycoSamples samples, HycoSamples seen, HycoSamples *rest);
 
+/* Removes the points for which drop[n_points] is true; the others keep their order. Not collective. */
+PetscErrorCode HycoSamplesDrop(HycoSamples samples, const PetscBool drop[]);
 /* Removes duplicate points and keeps the first of each, in the same order. n_dropped: number of removed points (may be
    NULL). Not collective. */
 PetscErrorCode HycoSamplesDropTwins(HycoSamples samples, PetscInt *n_dropped);

@@ -25,7 +25,8 @@ PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots);
   Solves full order at each sample that is not in the store yet. Collective. -hyco_groups G splits the communicator into
   G groups, which take the samples from a queue, one at a time: no group waits while a sample is left. Each solution is
   written under a temporary name and renamed, so that a run that was killed can resume and loses at most the samples in
-  progress. Fails, with the sample, if a solve does not converge. The other groups then stop: a path at its next
+  progress. Samples at which no contact forces balance the loads are noted in the folder, and removed from the set.
+  Fails, with the sample, if another solve does not converge. The other groups then stop: a path at its next
   iteration, another solution when it is stored.
 */
 PetscErrorCode HycoSnapshotsFill(HycoSnapshots snapshots, HycoSamples samples, HycoProgress progress, void *ctx);

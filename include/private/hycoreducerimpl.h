@@ -139,8 +139,10 @@ struct _p_HycoReducer {
   PetscReal cpu_solution;      /* HycoTraining */
   PetscReal cpu_begin;         /* of this rank, when the run began */
   PetscReal sliding;           /* of the last run's solutions, */
-  PetscReal time_error;        /* of those that were solved now */
-  PetscInt unsolved;           /* of the last run, every rank: HycoSnapshotsGetBalance() */
+  PetscInt n_lost;             /* its points without an equilibrium, and the first of them */
+  char first_lost[HYCO_LINE];
+  PetscReal time_error; /* of those that were solved now */
+  PetscInt unsolved;    /* of the last run, every rank: HycoSnapshotsGetBalance() */
   PetscReal *written;
   PetscReal solving;     /* seconds of its full-order solutions */
   PetscBool late;        /* the training points are solved when a type needs them; every rank */
@@ -167,8 +169,10 @@ static inline const char *const *HycoReducerVariants(HycoReducer t)
 }
 /* Sets t->columns, and t->n_s from it. */
 PetscErrorCode HycoReducerSetColumns(HycoReducer t, HycoSamples columns);
-/* Solves points that are not in the store, and counts the time. Collective. */
+/* Solves points that are not in the store; those without an equilibrium leave the set. HycoReducerSolve() counts the
+   time. Collective. */
 PetscErrorCode HycoReducerSolve(HycoReducer t, HycoSnapshots store, HycoSamples points);
+PetscErrorCode HycoReducerFill(HycoReducer t, HycoSnapshots store, HycoSamples points, HycoProgress progress);
 /* Frees the data of one run. */
 PetscErrorCode HycoReducerReset(HycoReducer t);
 /* The names of the types with a training, in order; NULL ends. */

@@ -23,7 +23,10 @@ struct _p_HycoSnapshots {
   PetscInt n_timed;           /* of all ranks */
   PetscReal sliding;          /* the largest of all points that were filled: HycoSummary */
   PetscReal time_error;       /* the same of the paths that were solved: HycoHistory */
-  HycoH5 last;                /* the file that was read last, checked and open; or NULL */
+  PetscInt n_lost, room_lost; /* points of all fills without an equilibrium: their number and, on rank 0, their keys */
+  unsigned long long *lost;
+  char first_lost[HYCO_LINE];         /* the first of them, with the reason; "": there is none */
+  HycoH5 last;                        /* the file that was read last, checked and open; or NULL */
   char last_path[PETSC_MAX_PATH_LEN]; /* its name */
   PetscInt n_pieces;                  /* finished pieces of this training that have files, by their keys; rank 0 */
   unsigned long long *piece;

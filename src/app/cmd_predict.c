@@ -225,10 +225,8 @@ static PetscErrorCode PredictCommandPath(HycoROM model, HycoScene scene, const c
                                  derives ? &gradient : NULL));
   PetscCall(PetscFree(carried));
   PetscCall(PetscFree(path.step));
-  HycoCheck(
-      p.reason != HYCO_DIVERGED_STEP,
-      "the history ends at t = %.10g, because its steps became too small: %s; the results up to this time are written",
-      (double)path.t, path.why);
+  HycoCheck(p.reason != HYCO_DIVERGED_STEP,
+            "the history ends at t = %.10g: %s; the results up to this time are written", (double)path.t, path.why);
   HycoCheck(p.reason > 0, "%s; the results up to this time are written", HycoReasonName(p.reason));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -94,6 +94,8 @@ static PetscErrorCode TrainCommandReport(HycoScene scene, HycoReducer reducer, c
   PetscCall(ReportCreate("train", scene, NULL, &json));
   cJSON_AddStringToObject(json, "model_type", t->type);
   cJSON_AddNumberToObject(json, "n_samples", t->n_samples);
+  cJSON_AddNumberToObject(json, "n_left_out", t->n_lost);
+  if (t->n_lost) cJSON_AddStringToObject(json, "no_equilibrium", t->first_lost);
   PetscCall(ReportGroups(json, reducer));
   ReportNumbers(json, {"n_modes", t->n_modes}, {"n_dual_modes", t->n_dual_modes}, {"n_stress_modes", t->n_stress_modes},
                 {"n_force_modes", t->n_force_modes}, {"n_fe_dofs", t->n_fe_dofs}, {"rid_nodes", t->rid_nodes},
@@ -282,6 +284,9 @@ PetscErrorCode CommandTrain(void)
     PetscCall(DriverPrint("scan of the ranges: %d points, smallest singular value %.1e of the largest%s\n",
                           (int)t.scan.n, (double)t.scan.smallest,
                           t.scan.n_singular ? "; SINGULAR inside, kept by -hyco_keep_singular" : ""));
+  if (t.n_lost)
+    PetscCall(DriverPrint("warning: %d point%s left out; there is no equilibrium: %s\n", (int)t.n_lost,
+                          t.n_lost > 1 ? "s are" : " is", t.first_lost));
   PetscCall(DriverWarnSliding(t.sliding));
   PetscCall(DriverWarnSteps(t.time_error));
   PetscCall(DriverJudgeModel(&search, &t));

@@ -243,6 +243,8 @@ static const Written written[] = {
     {"report", "solve predict", "points_per_second", "number", "1/s", "their number over seconds_total"},
 
     {"report", "train", "n_samples", "count", "-", "training solutions in the model"},
+    {"report", "train", "n_left_out", "count", "-", "training and held-out points without an equilibrium"},
+    {"report", "train", "no_equilibrium", "text", "-", "the first of them: point, time, body, direction"},
     {"report", "train", "solved_by_group", "counts", "-", "full-order solutions of each group of ranks"},
     {"report", "train", "unsolved_when_idle", "count", "-", "points left when the first group had none to begin"},
     {"report", "train", "written_mb_by_rank", "numbers", "MB", "solutions that each rank wrote"},

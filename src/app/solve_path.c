@@ -87,9 +87,6 @@ PetscErrorCode DriverEndHistory(HycoFOM fom, HycoScene scene, const PetscReal mu
   PetscCall(DriverWriteSteps(table, scene, mu, PETSC_FALSE, h.n, h.step));
   if (h.ended) PetscCall(PrintEnd(&h));
   HycoCheck(h.ended || h.n, "no solution: %s; nothing was written", h.why);
-  HycoCheck(
-      h.ended,
-      "the history ends at t = %.10g, because its steps became too small: %s; the results up to this time are written",
-      (double)h.t, h.why);
+  HycoCheck(h.ended, "the history ends at t = %.10g: %s; the results up to this time are written", (double)h.t, h.why);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -157,8 +157,9 @@ PetscErrorCode HycoFOMJudge(HycoFOM f, const PetscReal u[], Vec L, PetscReal ene
     PetscCall(NameLifted(f, f->path ? f->path->Bt : f->Bt, L, name));
   if (*reason == HYCO_DIVERGED_FLOATING && name[0])
     HycoFormat(why, "%s; no support keeps %s",
-               f->path && f->path->has_friction ? "not converged: no contact forces with this friction balance the load"
-                                                : HycoReasonName(*reason),
+               f->path && f->path->has_friction
+                   ? "no equilibrium: no contact forces with this friction balance the load"
+                   : HycoReasonName(*reason),
                name);
   if (*reason == HYCO_DIVERGED_DISPLACEMENT)
     HycoFormat(why, "%s (%.1e times the mesh's extent)", HycoReasonName(*reason), (double)*relative);

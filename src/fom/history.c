@@ -6,6 +6,7 @@
 #include <hycopath.h>
 #include <hycomaterialimpl.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Smallest step before a body slides away, as a share of the whole time: the time of sliding is then known to 6 digits
    (tests/paths/history.py). */
@@ -355,7 +356,8 @@ static PetscErrorCode HistoryReach(HycoPath p, PetscReal end, PetscBool *reached
     PetscCall(TryStep(p, stop));
     /* Where a body slides away in a larger step, its time is known well enough: steps just before it are the
        dearest. */
-    if (p->no_equilibrium[0]) least = PetscMax(least, SLIDING_STEP * (s->times[s->n_times - 1] - s->times[0]));
+    if (p->no_equilibrium[0] && p->has_friction)
+      least = PetscMax(least, SLIDING_STEP * (s->times[s->n_times - 1] - s->times[0]));
     if (p->t == t && (p->dt < least || (p->most_cuts && p->n_cuts > p->most_cuts))) *reached = PETSC_FALSE;
     /* At the listed time itself HistoryAdvance() saves, after the time is recorded. */
     if (p->t > t && p->t < end && p->ops->save) PetscCall((*p->ops->save)(p));
@@ -413,6 +415,12 @@ static PetscErrorCode HistoryAdvance(HycoPath p, PetscBool *reached)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether the path has not reached its end because no contact forces balance the loads. */
+static PetscBool LacksEquilibrium(HycoPath p)
+{
+  return (PetscBool)(!p->ended && p->no_equilibrium[0] && strstr(p->why, p->no_equilibrium));
+}
+
 /* All listed times from the current one; stops at the first that cannot be reached, which is no error: p->ended is
    false and p->why says why. Collective. The last accepted time is recorded too, so that its fields can be looked
    at. */
@@ -423,6 +431,12 @@ PetscErrorCode HycoPathRun(HycoPath p)
   PetscFunctionBegin;
   while (p->step < p->scene->n_times && reached) PetscCall(HistoryAdvance(p, &reached));
   p->ended = reached;
+  if (!reached && p->step && !LacksEquilibrium(p)) {
+    char why[HYCO_LINE];
+
+    HycoFormat(why, "its steps became too small: %s", p->why);
+    HycoFormat(p->why, "%s", why);
+  }
   if (!reached) PetscCall(HycoPathAssemble(p, p->t)); /* returns from the time that was not reached */
   if (!reached && p->now.substeps) PetscCall(HistoryRecord(p));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -472,6 +486,7 @@ void HycoPathGetHistory(HycoPath p, HycoHistory *h)
   h->ended = p->ended;
   h->t = p->t;
   h->why = p->why;
+  h->no_equilibrium = LacksEquilibrium(p);
   h->newton = HycoNewtons[HycoPathMethod(p)];
   h->factor_cost = HycoPathFactorCost(p);
   h->n_bound = p->n_bound;

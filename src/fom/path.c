@@ -286,7 +286,7 @@ static PetscErrorCode JudgeStep(HycoPath p, HycoReason reason, char why[HYCO_LIN
   PetscCall(VecGetArrayRead(f->U_local, &u));
   PetscCall(HycoFOMJudge(f, u, p->L_new, 0, &reason, &relative, why));
   PetscCall(VecRestoreArrayRead(f->U_local, &u));
-  if (f->friction && reason == HYCO_DIVERGED_FLOATING) HycoFormat(p->no_equilibrium, "%s", why);
+  if (reason == HYCO_DIVERGED_FLOATING) HycoFormat(p->no_equilibrium, "%s", why);
   /* Within round-off of the largest load that friction balances: what ends the path is what comes after it. */
   if (reason == HYCO_DIVERGED_HELD && p->no_equilibrium[0]) HycoFormat(why, "%s", p->no_equilibrium);
   PetscFunctionReturn(PETSC_SUCCESS);

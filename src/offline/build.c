@@ -724,6 +724,8 @@ PetscErrorCode HycoReducerClose(HycoReducer t, HycoSnapshots *store)
   PetscCall(HycoSnapshotsGetSolved(*store, &t->n_solvers, &solved));
   PetscCall(HycoSnapshotsGetBalance(*store, &t->unsolved, &written));
   t->sliding = (*store)->sliding;
+  t->n_lost = (*store)->n_lost;
+  HycoFormat(t->first_lost, "%s", (*store)->first_lost);
   t->cpu_solution = (*store)->cpu;
   t->time_error = (*store)->time_error;
   HycoFreeAll(&t->solved, &t->written);
@@ -731,6 +733,25 @@ PetscErrorCode HycoReducerClose(HycoReducer t, HycoSnapshots *store)
   HycoDuplicate(HycoSize(HycoComm(t)), written, &t->written);
   t->store = NULL;
   PetscCall(HycoSnapshotsDestroy(store));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Points without an equilibrium leave the set. If that is most of them, the ranges are wrong, not the points; corners
+   that are judged beside the held-out points may all be without. */
+PetscErrorCode HycoReducerFill(HycoReducer t, HycoSnapshots store, HycoSamples points, HycoProgress progress)
+{
+  const PetscBool whole = (PetscBool)(points == t->samples || points == t->held);
+  PetscInt n, left;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(points, &n, NULL, NULL));
+  PetscCall(HycoSnapshotsFill(store, points, progress, t->progress_ctx));
+  PetscCall(HycoSamplesGet(points, &left, NULL, NULL));
+  HycoCheck(!whole || 2 * left >= n,
+            "%d of %d %s points have no equilibrium, more than half; narrow the parameters' ranges, or give other "
+            "points; one of them is %s",
+            (int)(n - left), (int)n, points == t->held ? "held-out" : "training", store->first_lost);
+  if (points == t->columns) PetscCall(HycoReducerSetColumns(t, points));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -742,7 +763,7 @@ PetscErrorCode HycoReducerSolve(HycoReducer t, HycoSnapshots store, HycoSamples 
 
   PetscFunctionBegin;
   t->solves_held = (PetscBool)(points != t->samples);
-  HycoStaged(HYCO_STAGE_FULL_ORDER, HycoSnapshotsFill(store, points, t->progress, t->progress_ctx));
+  HycoStaged(HYCO_STAGE_FULL_ORDER, HycoReducerFill(t, store, points, t->progress));
   t->solving += HycoNow() - begin;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -950,6 +971,7 @@ PetscErrorCode HycoReducerHoldOutFresh(HycoReducer t, HycoSnapshots store, HycoS
 {
   HycoSamples fresh, held, others, last = t->held;
   PetscInt n, m = 0;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(last, &n, NULL, NULL));
@@ -962,13 +984,14 @@ PetscErrorCode HycoReducerHoldOutFresh(HycoReducer t, HycoSnapshots store, HycoS
   PetscCall(DrawHeld(t, n > m ? n - m : -1, TOGETHER, &fresh));
   PetscCall(HycoSamplesAddSet(held, fresh));
   PetscCall(HycoSamplesDropTwins(held, NULL));
-  PetscCall(HycoSamplesExcept(held, last, &others));
-  PetscCall(HycoSamplesGet(others, n_fresh, NULL, NULL));
   /* Those that judge no more: they may become training points. */
   PetscCall(HycoSamplesExcept(last, held, former));
   t->held = held;
+  ierr = HycoReducerSolve(t, store, held);
+  PetscCall(HycoSamplesExcept(held, last, &others));
+  PetscCall(HycoSamplesGet(others, n_fresh, NULL, NULL));
   HycoDestroyAll(&others, &fresh, &last);
-  PetscCall(HycoReducerSolve(t, store, t->held));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -1034,6 +1057,7 @@ static PetscErrorCode RunOn(HycoReducer t, HycoSnapshots store, HycoSamples samp
 PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char path[], HycoTraining *training)
 {
   HycoSnapshots store;
+  HycoSamples own;
   HycoTraining report = {0};
   PetscReal begin = HycoNow(), solved = 0;
 
@@ -1045,9 +1069,15 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
     HycoCheck(!(t->target[j] > 0) || t->validation || t->n_validation,
               "-target_%s needs held-out points, and -hyco_validation is 0; remove one of the two", HycoErrorKinds[j]);
   if (t->pinned[HYCO_CHOICE_TYPE] || !t->search) PetscCall(HycoReducerCheckContacts(t, t->prototype));
-  PetscCall(HycoReducerOpen(t, samples, path, &store));
-  HycoFinally(RunOn(t, store, samples, path, &report, &solved), PetscCall(HycoReducerClose(t, &store)));
+  /* A copy: points without an equilibrium leave it, and the given set is the caller's. */
+  PetscCall(HycoSamplesCreate(t->scene, &own));
+  HycoOnError(HycoSamplesAddSet(own, samples), PetscCall(HycoSamplesDestroy(&own)));
+  HycoOnError(HycoReducerOpen(t, own, path, &store), PetscCall(HycoSamplesDestroy(&own)));
+  HycoFinally(RunOn(t, store, own, path, &report, &solved), PetscCall(HycoReducerClose(t, &store));
+              PetscCall(HycoSamplesDestroy(&own)));
   report.sliding = t->sliding;
+  report.n_lost = t->n_lost;
+  report.first_lost = t->first_lost;
   report.time_error = t->time_error;
   /* Late solves happen inside the reduction: their time is counted with the snapshots. */
   report.cpu_solution = t->cpu_solution;

@@ -441,6 +441,7 @@ PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM 
   PetscCall(HycoSamplesGet(corners, &n_corners, NULL, NULL));
   /* The training points were not solved: their corners are now. */
   if (t->late && n_corners) PetscCall(HycoReducerSolve(t, store, corners));
+  PetscCall(HycoSamplesGet(corners, &n_corners, NULL, NULL));
   /* A search over paths has kept the rows of the chosen attempt. */
   if (!rows) {
     PetscCall(PetscMalloc1(n, &rows));

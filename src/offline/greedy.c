@@ -21,6 +21,7 @@ typedef struct {
   PetscInt n_par, n_points; /* of the training set */
   const PetscReal *points;  /* borrowed */
   PetscReal *value;         /* n_points x 4: eta, eta_u, eta_lambda, size */
+  PetscBool *chosen;        /* n_points: those that the loop has chosen, also if they have no equilibrium */
   HycoROM model;            /* model of the current iteration, on every rank */
   PetscReal begin;
 } Loop;
@@ -104,8 +105,8 @@ static PetscErrorCode CheckStart(HycoReducer t, PetscBool corners, HycoSamples s
 static PetscErrorCode BuildModel(HycoReducer t, Loop *loop, PetscInt iteration, HycoTraining *report)
 {
   PetscFunctionBegin;
+  PetscCall(HycoReducerFill(t, loop->store, loop->samples, iteration ? NULL : t->progress));
   PetscCall(HycoReducerSetColumns(t, t->samples));
-  PetscCall(HycoSnapshotsFill(loop->store, loop->samples, iteration ? NULL : t->progress, t->progress_ctx));
   PetscCall(HycoReducerResetBases(t));
   PetscCall(HycoReducerReduce(t, loop->store, PETSC_FALSE));
   if (t->trainer.modes) PetscCall((*t->trainer.modes)(t, loop->store));
@@ -247,6 +248,10 @@ static PetscErrorCode GreedyChoose(HycoReducer t, Loop *loop, PetscInt *worst, H
     const PetscReal *value = loop->value + 4 * k;
     PetscBool known = PETSC_FALSE;
 
+    for (PetscInt j = 0; j < n_solved && !known; j++)
+      PetscCall(PetscArraycmp(solved + j * loop->n_par, loop->points + k * loop->n_par, loop->n_par, &known));
+    if (loop->chosen[k] && !known) continue; /* it has no equilibrium */
+    step->n_points++;
     step->max_eta = PetscMax(step->max_eta, value[0]);
     /* Means of the finite ones; how many are infinite is reported beside them. */
     if (!PetscIsInfReal(value[0])) {
@@ -254,13 +259,10 @@ static PetscErrorCode GreedyChoose(HycoReducer t, Loop *loop, PetscInt *worst, H
       step->mean_eta_lambda += value[2];
       n_finite++;
     }
-    for (PetscInt j = 0; j < n_solved && !known; j++)
-      PetscCall(PetscArraycmp(solved + j * loop->n_par, loop->points + k * loop->n_par, loop->n_par, &known));
     /* A solved point may still have the largest indicator, as of a poor model: solving it again would never end. */
     if (!known && (*worst < 0 || GreedyPrecedes(t, loop, k, *worst))) *worst = k;
   }
-  step->n_points = loop->n_points;
-  step->n_infinite = loop->n_points - n_finite;
+  step->n_infinite = step->n_points - n_finite;
   step->mean_eta_u /= PetscMax(n_finite, 1);
   step->mean_eta_lambda /= PetscMax(n_finite, 1);
   if (*worst < 0) PetscFunctionReturn(PETSC_SUCCESS);
@@ -286,7 +288,7 @@ static PetscErrorCode GreedyIterate(HycoReducer t, Loop *loop, PetscInt iteratio
                                     PetscBool *last)
 {
   HycoGreedyStep step = {0};
-  PetscInt worst;
+  PetscInt worst = -1;
 
   PetscFunctionBegin;
   /* The former model before the next one is built: only one is in memory. */
@@ -305,7 +307,9 @@ static PetscErrorCode GreedyIterate(HycoReducer t, Loop *loop, PetscInt iteratio
   step.stop = WhyStop(t, &step);
   *last = (PetscBool)(step.stop != NULL);
   if (t->greedy.monitor) HycoOnRoot(HycoComm(t), t->greedy.monitor(&step, t->greedy.ctx));
-  if (!*last) PetscCall(HycoSamplesAddPoint(loop->samples, step.worst));
+  if (*last) PetscFunctionReturn(PETSC_SUCCESS);
+  loop->chosen[worst] = PETSC_TRUE;
+  PetscCall(HycoSamplesAddPoint(loop->samples, step.worst));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -397,12 +401,14 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
       "the greedy training has %d candidate point, and at least two are needed; give -training_grid 20,24, for example",
       (int)loop.n_points);
   PetscCall(PetscMalloc1(4 * loop.n_points, &loop.value));
+  PetscCall(PetscCalloc1(loop.n_points, &loop.chosen));
   PetscCall(GreedyStart(t, start, &loop.samples));
   PetscCall(CheckStart(t, (PetscBool)!start, loop.samples));
   PetscCall(HycoReducerOpen(t, loop.samples, path, &loop.store));
   HycoFinally(RunOn(t, &loop, path, &report), PetscCall(HycoReducerClose(t, &loop.store)); report.sliding = t->sliding;
-              report.cpu_solution = t->cpu_solution; report.time_error = t->time_error;
-              PetscCall(HycoSamplesDestroy(&loop.samples)); PetscCall(PetscFree(loop.value)));
+              report.cpu_solution = t->cpu_solution; report.time_error = t->time_error; report.n_lost = t->n_lost;
+              report.first_lost = t->first_lost; PetscCall(HycoSamplesDestroy(&loop.samples));
+              HycoFreeAll(&loop.value, &loop.chosen));
   if (training_report) *training_report = report;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

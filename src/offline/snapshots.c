@@ -75,7 +75,7 @@ PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots)
   HycoDestroyBegin(snapshots, HYCO_SNAPSHOTS_CLASSID);
   PetscCall(CloseSample(*snapshots));
   PetscCall(PetscFree2((*snapshots)->solved, (*snapshots)->written));
-  PetscCall(PetscFree((*snapshots)->piece));
+  HycoFreeAll(&(*snapshots)->piece, &(*snapshots)->lost);
   PetscCall(HycoSceneDestroy(&(*snapshots)->scene));
   PetscCall(PetscHeaderDestroy(snapshots));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -89,6 +89,18 @@ static PetscErrorCode SamplePath(HycoSnapshots s, const PetscReal mu[], char pat
 
   PetscFunctionBegin;
   PetscCall(PetscSNPrintf(path, PETSC_MAX_PATH_LEN, "%s/%016llx.h5", s->folder, hash));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The path of the file that says why there is no solution there: as of a solution, with another end. */
+static PetscErrorCode LostPath(HycoSnapshots s, const PetscReal mu[], char path[PETSC_MAX_PATH_LEN])
+{
+  char *end;
+
+  PetscFunctionBegin;
+  PetscCall(SamplePath(s, mu, path));
+  PetscCall(PetscStrrchr(path, '.', &end));
+  PetscCall(PetscStrncpy(end, "none", PETSC_MAX_PATH_LEN - (size_t)(end - path)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -141,6 +153,27 @@ static PetscErrorCode OpenSample(HycoSnapshots s, const PetscReal mu[], HycoH5 *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether a file says that there is no equilibrium at mu, and how it says that (NULL: not asked). Rank 0. */
+static PetscErrorCode ReadLost(HycoSnapshots s, const PetscReal mu[], PetscBool *lost, char why[HYCO_LINE])
+{
+  char path[PETSC_MAX_PATH_LEN], *text = NULL;
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(LostPath(s, mu, path));
+  *lost = (PetscBool)(access(path, F_OK) == 0);
+  if (!*lost) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
+  ierr = HycoSnapshotsCheckFile(s, h, path);
+  if (!ierr) ierr = HycoH5LoadText(h, "no_equilibrium", &text);
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  if (text && why) HycoFormat(why, "%s", text);
+  PetscCall(PetscFree(text));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* missing[]: the samples without a file, in order. On rank 0. Twins in the list are solved once. Files that exist
    are opened: one of another scene is refused before hours of solves. */
 static PetscErrorCode FindMissing(HycoSnapshots s, PetscInt n, PetscInt n_par, const PetscReal mu[],
@@ -150,8 +183,11 @@ static PetscErrorCode FindMissing(HycoSnapshots s, PetscInt n, PetscInt n_par, c
   *n_missing = 0;
   for (PetscInt k = 0; k < n; k++) {
     char path[PETSC_MAX_PATH_LEN];
+    PetscBool lost;
     HycoH5 h;
 
+    PetscCall(ReadLost(s, mu + k * n_par, &lost, NULL));
+    if (lost) continue;
     PetscCall(SamplePath(s, mu + k * n_par, path));
     if (access(path, F_OK) != 0) {
       PetscBool twin = PETSC_FALSE;
@@ -184,11 +220,10 @@ static PetscReal SlidingOf(HycoFOM fom)
   return sliding;
 }
 
-/* Writes the data of a solution that are on rank 0. The fingerprint first, without which a file is not read;
-   `history` lets a message say what changed. */
-static PetscErrorCode WriteHead(HycoSnapshots s, HycoFOM fom, HycoH5 h, const PetscReal mu[])
+/* Writes whose the data are. The fingerprint first, without which a file is not read; `history` lets a message say
+   what changed. Rank 0. */
+static PetscErrorCode WriteOwner(HycoSnapshots s, HycoH5 h, const PetscReal mu[])
 {
-  const PetscReal sliding = SlidingOf(fom);
   char fingerprint[32], *history;
   PetscErrorCode ierr = PETSC_SUCCESS;
 
@@ -201,6 +236,16 @@ static PetscErrorCode WriteHead(HycoSnapshots s, HycoFOM fom, HycoH5 h, const Pe
   PetscCall(PetscFree(history));
   PetscCall(ierr);
   PetscCall(HycoH5WriteReal(h, "mu", s->scene->n_parameters, 1, mu));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Writes the data of a solution that are on rank 0. */
+static PetscErrorCode WriteHead(HycoSnapshots s, HycoFOM fom, HycoH5 h, const PetscReal mu[])
+{
+  const PetscReal sliding = SlidingOf(fom);
+
+  PetscFunctionBegin;
+  PetscCall(WriteOwner(s, h, mu));
   PetscCall(HycoH5WriteReal(h, "sliding", 1, 1, &sliding));
   s->sliding = PetscMax(s->sliding, sliding);
   if (fom->path) {
@@ -402,10 +447,27 @@ static PetscErrorCode SnapshotsSolve(HycoSnapshots s, HycoFOM fom, const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves the path and writes its file; a path that does not reach its end is an error. Fields are written while
-   the path is solved, by the monitor: no listed time is held in memory. `taken` follows at the end, when the
-   number of steps is known. */
-static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[])
+/* Writes that there is no equilibrium at mu, so that a later run does not look for it again. Rank 0 of the group. */
+static PetscErrorCode WriteLost(HycoSnapshots s, const PetscReal mu[], const char why[])
+{
+  char path[PETSC_MAX_PATH_LEN];
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(LostPath(s, mu, path));
+  PetscCall(HycoH5Create(path, &h));
+  ierr = WriteOwner(s, h, mu);
+  if (!ierr) ierr = HycoH5WriteText(h, "no_equilibrium", why);
+  PetscCall(HycoH5Close(&h, (PetscBool)!ierr));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Solves the path and writes its file; a path that does not reach its end is an error, but one beyond which there is no
+   equilibrium is `lost`. Fields are written while the path is solved, by the monitor: no listed time is held in memory.
+   `taken` follows at the end, when the number of steps is known. */
+static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[], char lost[HYCO_LINE])
 {
   HycoHistory history;
   HycoSummary summary;
@@ -417,9 +479,11 @@ static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[]
   PetscCall(SnapshotsSolve(w->s, fom, mu, &summary));
   PetscCall(HycoFOMGetHistory(fom, &history));
   HycoSceneNamePoint(w->s->scene, mu, at);
+  lost[0] = '\0';
+  if (history.no_equilibrium) HycoFormat(lost, "%s ends at t = %g: %s", at, (double)history.t, history.why);
+  if (lost[0]) PetscFunctionReturn(PETSC_SUCCESS);
   /* Half of a path would train a model that is wrong at the end and does not know it. */
-  HycoCheck(history.ended, "the path at %s ends at t = %.10g, because its steps became too small: %s", at,
-            (double)history.t, history.why);
+  HycoCheck(history.ended, "the path at %s ends at t = %.10g: %s", at, (double)history.t, history.why);
   HycoOnRoot(HycoComm(fom), WriteHead(w->s, fom, w->h, mu));
   HycoOnRoot(HycoComm(fom), HycoH5WriteReal(w->h, "taken", history.n_taken, 1, history.taken));
   HycoOnRoot(HycoComm(fom), HycoH5WriteReal(w->h, "time_error", 1, 1, &history.time_error));
@@ -431,7 +495,7 @@ static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[]
 static PetscErrorCode SolvePath(HycoSnapshots s, HycoFOM fom, const PetscReal mu[], PetscReal force[])
 {
   PathWriter w = {.s = s, .force = force};
-  char path[PETSC_MAX_PATH_LEN];
+  char path[PETSC_MAX_PATH_LEN], lost[HYCO_LINE] = "";
   PetscErrorCode ierr, failed;
 
   PetscFunctionBegin;
@@ -442,11 +506,12 @@ static PetscErrorCode SolvePath(HycoSnapshots s, HycoFOM fom, const PetscReal mu
   PetscCall(SamplePath(s, mu, path));
   PetscCall(PetscMalloc1(fom->part->n_cells, &w.inelastic));
   PetscCall(HycoH5CreateShared(HycoComm(fom), path, &w.h));
-  ierr = WritePath(&w, fom, mu);
+  ierr = WritePath(&w, fom, mu, lost);
   s->bytes += HycoH5Written(w.h);
-  failed = HycoH5Close(&w.h, (PetscBool)!ierr);
+  failed = HycoH5Close(&w.h, (PetscBool)(!ierr && !lost[0]));
   PetscCall(PetscFree(w.inelastic));
   PetscCall(ierr ? ierr : failed);
+  if (lost[0]) HycoOnRoot(HycoComm(fom), WriteLost(s, mu, lost));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -454,6 +519,7 @@ static PetscErrorCode SolvePath(HycoSnapshots s, HycoFOM fom, const PetscReal mu
 static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal mu[], PetscReal force[])
 {
   HycoSummary summary;
+  char at[HYCO_LINE], lost[HYCO_LINE];
 
   PetscFunctionBegin;
   if (fom->path) {
@@ -466,12 +532,13 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
             "neither supports nor contact keep %s: full order can be regularised, but a reduced model cannot; fix a "
             "component",
             summary.regularised);
-  if (summary.reason < 0) {
-    char at[HYCO_LINE];
-
-    HycoSceneNamePoint(s->scene, mu, at);
-    SETERRQ(HycoComm(fom), PETSC_ERR_USER, "the snapshot at %s: %s", at, summary.why);
+  HycoSceneNamePoint(s->scene, mu, at);
+  if (summary.reason == HYCO_DIVERGED_FLOATING) {
+    HycoFormat(lost, "%s: %s", at, summary.why);
+    HycoOnRoot(HycoComm(fom), WriteLost(s, mu, lost));
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
+  PetscCheck(summary.reason >= 0, HycoComm(fom), PETSC_ERR_USER, "the snapshot at %s: %s", at, summary.why);
   PetscCall(HycoFOMStress(fom));
   PetscCall(HycoFOMGetForces(fom, force));
   PetscCall(WriteSample(s, fom, mu, force));
@@ -582,6 +649,43 @@ static PetscErrorCode SolveMissing(HycoSnapshots s, const Missing *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Marks the samples without an equilibrium; the store keeps their number, and the text of the first. Rank 0. */
+static PetscErrorCode FindLost(HycoSnapshots s, const Missing *m, PetscBool lost[])
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < m->n_all; k++) {
+    PetscBool known = PETSC_FALSE;
+    char why[HYCO_LINE];
+    unsigned long long key;
+
+    PetscCall(ReadLost(s, m->mu + k * m->n_par, &lost[k], why));
+    if (!lost[k]) continue;
+    key = HycoHash(HYCO_HASH_START, m->mu + k * m->n_par, (size_t)m->n_par * sizeof(PetscReal));
+    for (PetscInt j = 0; j < s->n_lost && !known; j++) known = (PetscBool)(s->lost[j] == key);
+    if (known) continue;
+    if (!s->n_lost) HycoFormat(s->first_lost, "%s", why);
+    HycoGrow(s->n_lost, s->room_lost, s->lost);
+    s->lost[s->n_lost++] = key;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Removes the samples without an equilibrium from the set. */
+static PetscErrorCode DropLost(HycoSnapshots s, const Missing *m, HycoSamples samples)
+{
+  PetscBool *lost;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_all, &lost));
+  HycoOnRoot(HycoComm(s), FindLost(s, m, lost));
+  PetscCallMPI(MPI_Bcast(&s->n_lost, 1, MPIU_INT, 0, HycoComm(s)));
+  PetscCallMPI(MPI_Bcast(s->first_lost, HYCO_LINE, MPI_CHAR, 0, HycoComm(s)));
+  HycoBcast(lost, m->n_all, MPIU_BOOL, HycoComm(s));
+  PetscCall(HycoSamplesDrop(samples, lost));
+  PetscCall(PetscFree(lost));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Points that are stored are not solved again, whatever their order or number was in an earlier run. */
 PetscErrorCode HycoSnapshotsFill(HycoSnapshots s, HycoSamples samples, HycoProgress progress, void *ctx)
 {
@@ -604,6 +708,7 @@ PetscErrorCode HycoSnapshotsFill(HycoSnapshots s, HycoSamples samples, HycoProgr
   HycoAllreduce(&s->sliding, 1, MPIU_REAL, MPI_MAX, HycoComm(s));
   HycoAllreduce(&s->time_error, 1, MPIU_REAL, MPI_MAX, HycoComm(s));
   PetscCall(PetscFree(m.missing));
+  PetscCall(DropLost(s, &m, samples));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

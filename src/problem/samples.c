@@ -292,25 +292,38 @@ static PetscErrorCode FindTwins(HycoSamples s, PetscBool twin[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* All ranks remove the same points. */
+PetscErrorCode HycoSamplesDrop(HycoSamples s, const PetscBool drop[])
+{
+  PetscInt P, n;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
+  HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
+  HycoCheckGiven(drop);
+  P = s->scene->n_parameters;
+  n = s->n;
+  s->n = 0;
+  /* Moved in place: no point moves to a larger number. PetscArraymove() since source and target may be the same. */
+  for (PetscInt k = 0; k < n; k++) {
+    if (!drop[k]) PetscCall(PetscArraymove(s->mu + s->n++ * P, s->mu + k * P, P));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The order of the others stays. */
 PetscErrorCode HycoSamplesDropTwins(HycoSamples s, PetscInt *n_dropped)
 {
-  PetscInt kept = 0;
+  const PetscInt n = s->n;
   PetscBool *twin;
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
   HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
-  PetscCall(PetscMalloc1(s->n, &twin));
+  PetscCall(PetscMalloc1(s->n + 1, &twin));
   PetscCall(FindTwins(s, twin));
-  for (PetscInt k = 0; k < s->n; k++) {
-    const PetscInt P = s->scene->n_parameters;
-
-    /* Moved in place: `kept` never exceeds k. PetscArraymove() since source and target may be the same. */
-    if (!twin[k]) PetscCall(PetscArraymove(s->mu + kept++ * P, s->mu + k * P, P));
-  }
-  if (n_dropped) *n_dropped = s->n - kept;
-  s->n = kept;
+  PetscCall(HycoSamplesDrop(s, twin));
+  if (n_dropped) *n_dropped = n - s->n;
   PetscCall(PetscFree(twin));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

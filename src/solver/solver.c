@@ -692,7 +692,7 @@ const char *HycoReasonName(HycoReason reason)
   case HYCO_DIVERGED_RESIDUAL:
     return "not converged: a KKT residual is above the tolerance";
   case HYCO_DIVERGED_FLOATING:
-    return "not converged: a body is held by contact only, and this load lifts it off";
+    return "no equilibrium: a body is held by contact only, and this load lifts it off";
   case HYCO_DIVERGED_HELD:
     return "not converged: a body is held by contact only, and its equilibrium was not found, although contact forces "
            "can balance this load; use -hyco_linear direct, or add a support or a spring";

@@ -68,7 +68,7 @@ class Block(Case):
         for ranks in (0, 2):  # check says so without a solve
             found = self.hyco('check', '-scene', self.scene(PAIR), ranks=ranks)
             self.assertEqual((found['n_lifted'], len([w for w in found['warnings'] if 'solve fails at 2 of the 5 points assembled, the first at crown = 0, '
-                             'press = -100: not converged: a body is held by contact only, and this load lifts it off; no support keeps body block' in w])), (2, 1))
+                             'press = -100: no equilibrium: a body is held by contact only, and this load lifts it off; no support keeps body block' in w])), (2, 1))
 
     def test_other_types(self):
         """Methods that cannot solve for floating bodies name the one that can."""

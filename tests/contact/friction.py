@@ -108,6 +108,18 @@ output: {T: {friction: x, contact: punch}, N: {force: y, contact: punch}}
 """
 
 
+DRAWN = """
+scene: {mesh: mesh.msh, parameters: [cut]}
+parameter: {cut: {range: [1, 8]}}
+body: {block: {young: 1000, poisson: 0.3}}
+pressure: {top: "10*min(t, 1)"}
+traction: {end: {x: "cut*max(t - 1, 0)"}}
+contact: {floor: {type: obstacle, group: base, normal: {y: -1}, gap: 0, friction: 0.3}}
+history: {times: [0, 0.5, 1, 1.5, 2]}
+output: {T: {friction: x, contact: floor}}
+"""
+
+
 class Friction(Case):
     def pad(self, name='scene.yaml', law=ELASTIC, mu='0.3', more='', **changes):
         grid = Grid()
@@ -178,6 +190,31 @@ class Friction(Case):
             self.assertLess(max(found['history']['kkt_max']), 1e-10, k)
             for name, value in free.items():
                 self.near(found['outputs'][name], value, 1e-4, name)
+
+    def test_slides_away(self):
+        """A block that is drawn away beyond cut = 6: training leaves these points out, held-out ones too, and says point, time, body and direction, on any
+        number of ranks; a second run finds them in the folder; more than half are refused."""
+        grid = Grid()
+        grid.box('quad4', [np.linspace(0, 2, 5), np.linspace(0, 1, 3)], lambda x: x, 'block', {'y0': 'base', 'y1': 'top', 'x1': 'end'})
+        self.written(DRAWN, grid)
+        with open(self.path('held.csv'), 'w', encoding='ascii') as f:
+            f.write('cut\n' + ''.join(f'{1.4 + 0.3 * k}\n' for k in range(12)) + '7.5\n')
+        train = ('train', '-scene', 'scene.yaml', '-hyco_model_type', 'bodies', '-hyco_validation', '12', '-validation_points', 'held.csv', '-model')
+        for ranks in (0, 2, 0):
+            if ranks:
+                shutil.rmtree(self.path('m.h5.snapshots'))
+            found = self.hyco(*train, 'm.h5', '-grid', '5', '-hyco_groups', max(1, ranks), ranks=ranks)
+            self.assertEqual((found['n_samples'], found['n_left_out'], found['held_out']['n']), (3, 3, 12))
+            for part in ('cut = 6.25', 't = 1.96', 'block', '(1, 0, 0)'):
+                self.assertIn(part, found['no_equilibrium'])
+            self.assertLess(found['held_out']['lambda']['largest'], 1e-9)
+        self.assertEqual(sum(found['solved_by_group']), 0)
+        run = self.run_raw(*train, 'n.h5', '-values_cut', '5,7,8', '-hyco_snapshots', 'half')
+        self.assertEqual((run.returncode, run.stderr.count('hyco: error')), (1, 1))
+        self.assertIn('2 of 3', run.stderr)
+        for args in (('solve', '-scene', 'scene.yaml'), ('predict', '-model', 'm.h5', '-extrapolate')):
+            run = self.run_raw(*args, '-mu', '8')
+            self.assertIn('t = 1.75: no equilibrium', run.stderr)
 
     def test_arbitrary(self):
         """A block all of whose contacts slip as it widens: body, direction and times of the motion that none holds, alike from full order and a model;

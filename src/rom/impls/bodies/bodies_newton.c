@@ -863,7 +863,7 @@ static PetscErrorCode BodiesNewtonSolveContact(HycoROM m, PetscReal t1, const Pe
   PetscCall(
       HycoBodiesFrictionSolveContact(w->friction, &w->bodies, t1, w->n_rows ? alpha : NULL, again, &its, &solved));
   a->active_its += its;
-  if (!solved) HycoFormat(a->why, "not converged: no contact forces with this friction balance the load");
+  if (!solved) HycoFormat(a->why, "no equilibrium: no contact forces with this friction balance the load");
   if (!solved) PetscCall(HycoBodiesFrictionNoEquilibrium(w->friction, &w->bodies, name, &no_equilibrium));
   if (no_equilibrium)
     HycoFormat(w->path->no_equilibrium, "%s%s%s", a->why,
