@@ -316,10 +316,10 @@ PetscErrorCode HycoContactsCandidates(MPI_Comm comm, HycoFE fe, PetscReal slack,
     PetscCall(FindMargin(&s, c->integrated, slack));
     /* Where surfaces go round edges, a slave may face a part of the master that is not the nearest. */
     PetscCall(HycoContactEdges(scene, fe->mesh, c, &edges));
-    HycoAllreduce(&edges, 1, MPIU_INT, MPI_MAX, comm);
+    HycoAllreduce(&edges, 1, MPIU_INT, MPI_BOR, comm);
     PetscCall(FindReach(&s));
     /* The one node of a rigid body is the master everywhere, too. */
-    PetscCall(c->rigid || edges ? AddAll(&s) : AddNear(&s));
+    PetscCall(c->rigid || (edges & HYCO_EDGES) ? AddAll(&s) : AddNear(&s));
   }
   /* One exchange for all contacts. */
   PetscCall(HycoSendRows(comm, s.n, s.to, sizeof(PetscInt), s.node, n, node));

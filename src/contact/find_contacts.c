@@ -39,7 +39,7 @@ PetscErrorCode HycoContactsFacts(MPI_Comm comm, HycoScene scene, HycoMesh part, 
   for (PetscInt k = 0; k < scene->n_contacts; k++) {
     HycoContact c = scene->contact[k];
     /* One reduction with MPI_MIN for both. */
-    PetscReal least[4] = {PETSC_MAX_REAL, 0, 0, 0}; /* the tolerance, minus whether it is moved, minus its edges */
+    PetscReal least[5] = {PETSC_MAX_REAL, 0, 0, 0, 1}; /* the tolerance, minus whether it is moved, minus its edges */
     PetscBool moved = PETSC_FALSE;
     PetscInt g = 0, edges;
 
@@ -51,10 +51,11 @@ PetscErrorCode HycoContactsFacts(MPI_Comm comm, HycoScene scene, HycoMesh part, 
     PetscCall(HycoContactEdges(scene, part, c, &edges));
     least[2] = -(edges & HYCO_SLAVE_EDGE);
     least[3] = -(edges & HYCO_MASTER_EDGE);
-    HycoAllreduce(least, 4, MPIU_REAL, MPI_MIN, comm);
+    least[4] = edges & HYCO_SLAVE_ROUND;
+    HycoAllreduce(least, 5, MPIU_REAL, MPI_MIN, comm);
     facts[k].small = least[0] < PETSC_MAX_REAL ? least[0] : 0;
     facts[k].moved = (PetscBool)(least[1] < 0);
-    facts[k].edges = -(PetscInt)(least[2] + least[3]);
+    facts[k].edges = (least[2] < 0 ? HYCO_SLAVE_ROUND : (PetscInt)least[4]) - (PetscInt)(least[2] + least[3]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

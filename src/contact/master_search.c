@@ -106,12 +106,17 @@ void HycoMasterSearchSides(const HycoMasterSearch *t, PetscInt node, PetscInt si
    masters are nodes (pair), not points of facets. */
 PetscErrorCode HycoMasterSearchCreate(HycoFE fe, HycoContact c, PetscBool nodes, PetscInt edges, HycoMasterSearch *t)
 {
+  const PetscInt corners = HycoCellKinds[fe->mesh->type].corners;
   PetscInt slave, master;
 
   PetscFunctionBegin;
   PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &slave));
   PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->master, &master));
   PetscCall(HycoMasterSearchCreateOn(fe, slave, master, nodes, t));
+  /* Facets of second order are projected on by their corners. */
+  for (PetscInt k = 0; k < t->n * corners && t->nf > corners; k++)
+    t->node[k] = t->node[k / corners * t->nf + k % corners];
+  t->nf = PetscMin(t->nf, corners);
   t->edges = edges;
   PetscCall(AddSlots(t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -209,7 +214,7 @@ void HycoMasterSearchProject(const HycoMasterSearch *t, PetscInt slave, PetscBoo
   HycoPatchesProject(t->patches, x, out, at); /* at a corner: of the facets that contain the point */
   if (!at->n || at->distance <= nearest.distance + HYCO_SAME_POINT * ShortestEdge(t, at->patch)) return;
   HycoMasterSearchAcross(t, slave, at, r);
-  if (!t->edges || HycoDot(r, out) < -HYCO_OPPOSED * at->distance) at->n = 0;
+  if (!(t->edges & HYCO_EDGES) || HycoDot(r, out) < -HYCO_OPPOSED * at->distance) at->n = 0;
 }
 
 /* Edges as pairs of ascending nodes. */

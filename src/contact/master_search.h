@@ -99,6 +99,10 @@ PetscErrorCode HycoMasterSearchFind(HycoMasterSearch *search, const HycoQuery *q
 PetscErrorCode HycoMasterSearchNearest(HycoMasterSearch *search, const HycoQuery *query, PetscInt node, PetscInt side,
                                        HycoProjection *at, HycoVerdict *why);
 PetscBool HycoVerdictIsBetter(const HycoProjection *at, HycoVerdict why, const HycoProjection *best, HycoVerdict other);
+/* Slaves that are too far and lie on a side of a body none of whose slaves has a master (met), while others have: they
+   count as turned away, like the sides that look elsewhere. On whole surfaces. */
+PetscErrorCode HycoMasterSearchForgive(const HycoMasterSearch *search, PetscInt n, const PetscInt slave[],
+                                       const PetscBool met[], HycoVerdict why[]);
 /* A type's choice of masters from the nearest points. */
 typedef PetscErrorCode (*HycoSettle)(HycoMasterSearch *search, HycoContact contact, HycoMatch *match);
 /* What to do about n slave nodes without a master, as the end of a message. */

@@ -223,7 +223,7 @@ static void FindNearest(Mortar *s, HycoProjection *at)
   HycoProjection opposed;
 
   HycoPatchesProject(s->patches, plane->centre, NULL, at);
-  s->front = (PetscBool)(s->edges && HycoDot(s->t.normal + 3 * at->patch, plane->normal) > HYCO_OPPOSED);
+  s->front = (PetscBool)((s->edges & HYCO_EDGES) && HycoDot(s->t.normal + 3 * at->patch, plane->normal) > HYCO_OPPOSED);
   if (!s->front) return;
   HycoPatchesProject(s->patches, plane->centre, plane->normal, &opposed);
   if (opposed.n) *at = opposed;

@@ -157,14 +157,35 @@ static PetscErrorCode AppendMatched(HycoMasterSearch *t, HycoContact c, PetscInt
 
 /* Whether slave i of a node's sides is kept, of which `best` is the first that is not worse than the others: each with
    a master, if the normals are those of the sides; else the nearest, or the best. A slave that does not look at the
-   master has no contact if its surface goes round an edge: such a surface has them by nature. */
+   master has no contact if its surface closes on itself or goes round an edge: such a surface has them by nature. */
 static PetscBool IsKept(const HycoMasterSearch *t, HycoContact c, const HycoMatch *m, PetscInt i, PetscInt best)
 {
-  if (m->why[best] != HYCO_FOUND && m->why[best] != HYCO_FAR && (t->edges & HYCO_SLAVE_EDGE)) return PETSC_FALSE;
+  if (m->why[best] != HYCO_FOUND && m->why[best] != HYCO_FAR && (t->edges & HYCO_SLAVE_ROUND)) return PETSC_FALSE;
   return (PetscBool)(i == best || (m->why[i] == HYCO_FOUND && HycoContactAverages(c)));
 }
 
-/* Leaves out the sides of nodes on edges that have no contact. */
+/* On a part the surfaces are not whole: there it is an error, and the whole ones are searched. */
+static PetscErrorCode ForgiveFar(HycoMasterSearch *t, HycoMatch *m)
+{
+  PetscBool *met;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n, &met));
+  for (PetscInt k = 0; k < m->n; k++) met[k] = (PetscBool)(m->why[k] == HYCO_FOUND && m->at[k].n);
+  PetscCall(HycoMasterSearchForgive(t, m->n, m->slave, met, m->why));
+  PetscCall(PetscFree(met));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether two sides of a node have the same facet of the master. */
+static PetscBool MeetSame(const HycoMatch *m, PetscInt i, PetscInt j)
+{
+  return (PetscBool)(m->why[i] == HYCO_FOUND && m->why[j] == HYCO_FOUND && m->at[i].n && m->at[j].n &&
+                     m->at[i].patch == m->at[j].patch);
+}
+
+/* Leaves out the sides of nodes on edges that have no contact. Two that meet one facet of the master alike, as those of
+   a blade, are one contact of the node. */
 static void DropSides(const HycoMasterSearch *t, HycoContact c, HycoMatch *m)
 {
   PetscInt n = 0;
@@ -175,7 +196,10 @@ static void DropSides(const HycoMasterSearch *t, HycoContact c, HycoMatch *m)
       if (HycoVerdictIsBetter(&m->at[next], m->why[next], &m->at[best], m->why[best])) best = next;
     }
     for (PetscInt i = k; i < next; i++) {
-      if (!IsKept(t, c, m, i, best)) continue;
+      if (i != best && MeetSame(m, i, best)) m->slave[best] = HycoMasterSearchNode(t, m->slave[best]);
+    }
+    for (PetscInt i = k; i < next; i++) {
+      if (!IsKept(t, c, m, i, best) || (i != best && MeetSame(m, i, best))) continue;
       m->slave[n] = m->slave[i];
       m->at[n] = m->at[i];
       m->why[n++] = m->why[i];
@@ -212,6 +236,7 @@ static PetscErrorCode PairingMatch(HycoMasterSearch *t, HycoContact c, PetscInt 
   query.small = m->small;
   p->queries += m->n;
   ierr = HycoMasterSearchFind(t, &query, m->n, m->slave, m->at, m->why);
+  if (!ierr && !m->part) ierr = ForgiveFar(t, m);
   if (!ierr) DropSides(t, c, m);
   if (!ierr) ierr = (*settle)(t, c, m);
   if (!ierr) ierr = AppendMatched(t, c, index, remedy, m, missed, p);

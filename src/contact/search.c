@@ -3,6 +3,10 @@
 */
 #include "master_search.h"
 
+/* Of cosines: a side of an edge that opposes a facet of the master by so much less than another side at the node is
+   beside it, as the underside of a wedge whose flank lies on the facet. */
+#define BESIDE 0.2
+
 /* Whether the direction to a master point misses it: by its angle to the normal, or past the border. */
 static PetscErrorCode FindMiss(HycoMasterSearch *t, PetscInt slave, const HycoProjection *at, HycoVerdict *why)
 {
@@ -19,9 +23,24 @@ static PetscErrorCode FindMiss(HycoMasterSearch *t, PetscInt slave, const HycoPr
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether another side at the slave's node meets its facet of the master. */
+static PetscBool IsBeside(const HycoMasterSearch *t, PetscInt slave, const HycoProjection *at)
+{
+  const PetscReal *normal = t->normal + 3 * at->patch;
+  PetscBool beside = PETSC_FALSE;
+  PetscInt first, n;
+
+  if (slave < t->n_nodes || slave >= t->n_nodes + t->n_slots) return PETSC_FALSE;
+  HycoMasterSearchSides(t, HycoMasterSearchNode(t, slave), HYCO_ONE_SIDE, &first, &n);
+  for (PetscInt j = first; j < first + n; j++)
+    beside =
+        (PetscBool)(beside || HycoDot(t->outward + 3 * j, normal) < HycoDot(t->outward + 3 * slave, normal) - BESIDE);
+  return beside;
+}
+
 /* Verdict on a slave as drawn: met, turned away, too far, askew (its normal misses the master point), past the
-   border. Within `small` the direction is round-off and is not judged. On a surface that goes round an edge, of which
-   parts face nothing by nature, only a slave in front of the master is too far. */
+   border. Within `small` the direction is round-off and is not judged. On a surface that goes round, of which parts
+   face nothing by nature, only a slave in front of the master is too far. */
 PetscErrorCode HycoMasterSearchJudge(HycoMasterSearch *t, PetscInt slave, PetscReal tolerance, PetscReal small,
                                      HycoProjection *at, HycoVerdict *why)
 {
@@ -37,12 +56,16 @@ PetscErrorCode HycoMasterSearchJudge(HycoMasterSearch *t, PetscInt slave, PetscR
     HycoMasterSearchProject(t, slave, PETSC_TRUE, at);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  if (IsBeside(t, slave, at)) {
+    *why = HYCO_TURNED;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   far = (PetscBool)(at->distance > tolerance);
-  if (HycoMasterSearchOutward(t, slave) && at->distance > small && (!far || (t->edges & HYCO_SLAVE_EDGE)))
+  if (HycoMasterSearchOutward(t, slave) && at->distance > small && (!far || (t->edges & HYCO_SLAVE_ROUND)))
     PetscCall(FindMiss(t, slave, at, why));
   if (!far || *why != HYCO_FOUND) PetscFunctionReturn(PETSC_SUCCESS);
   *why = HYCO_FAR;
-  if (!t->edges) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!(t->edges & HYCO_EDGES)) PetscFunctionReturn(PETSC_SUCCESS);
   /* Another part of the master is nearer. */
   HycoMasterSearchProject(t, slave, PETSC_TRUE, &nearest);
   if (nearest.patch != at->patch && at->distance > 2 * nearest.distance) *why = HYCO_TURNED;
@@ -57,7 +80,7 @@ static PetscErrorCode MasterSearchUpdate(HycoMasterSearch *t, PetscInt slave, Pe
 
   PetscFunctionBegin;
   HycoMasterSearchProject(t, slave, PETSC_FALSE, at);
-  if (at->n && at->distance > reach) at->n = 0;
+  if (at->n && (at->distance > reach || IsBeside(t, slave, at))) at->n = 0;
   if (!at->n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoMasterSearchIsPast(t, slave, at, &past));
   if (past) at->n = 0;
@@ -79,6 +102,44 @@ static PetscErrorCode AnswerAll(HycoMasterSearch *t, const HycoQuery *q, PetscIn
     else
       PetscCall(HycoMasterSearchJudge(t, slave[k], q->tolerance, q->small, &at[k], &why[k]));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscInt FindRoot(PetscInt root[], PetscInt i)
+{
+  while (root[i] != i) i = root[i] = root[root[i]];
+  return i;
+}
+
+/* Facets are joined at the nodes, on edges at the sides, that they share. */
+PetscErrorCode HycoMasterSearchForgive(const HycoMasterSearch *t, PetscInt n, const PetscInt slave[],
+                                       const PetscBool met[], HycoVerdict why[])
+{
+  const HycoMesh m = t->fe->mesh;
+  PetscBool *meets, any = PETSC_FALSE;
+  PetscInt *root;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++) any = (PetscBool)(any || met[k]);
+  if (!any || !(t->edges & HYCO_SLAVE_EDGE)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(t->n_nodes + t->n_slots, &root));
+  PetscCall(PetscCalloc1(t->n_nodes + t->n_slots, &meets));
+  for (PetscInt i = 0; i < t->n_nodes + t->n_slots; i++) root[i] = i;
+  for (PetscInt k = 0, first = 0; k < m->n_facets * m->nf; k++) {
+    if (m->facet_group[k / m->nf] != t->slave || m->facet_side[k] == HYCO_NO_SIDE) continue;
+    if (k % m->nf == 0) first = HycoMasterSearchSlave(t, m->facets[k], m->facet_side[k]);
+    root[FindRoot(root, HycoMasterSearchSlave(t, m->facets[k], m->facet_side[k]))] = FindRoot(root, first);
+  }
+  for (PetscInt k = 0; k < n; k++) meets[FindRoot(root, slave[k])] |= met[k];
+  for (PetscInt k = 0; k < n; k++) {
+    PetscInt first = slave[k], sides = 1;
+    PetscBool alone = PETSC_TRUE;
+
+    if (first < t->n_nodes) HycoMasterSearchSides(t, first, HYCO_ONE_SIDE, &first, &sides);
+    for (PetscInt j = first; j < first + sides; j++) alone = (PetscBool)(alone && !meets[FindRoot(root, j)]);
+    if (why[k] == HYCO_FAR && alone) why[k] = HYCO_TURNED;
+  }
+  HycoFreeAll(&root, &meets);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

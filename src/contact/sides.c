@@ -193,9 +193,49 @@ PetscErrorCode HycoSurfaceSides(HycoScene scene, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Ends of facets, by node, and the node at the other end. */
+static int CompareEnds(const void *a, const void *b)
+{
+  const PetscInt *p = (const PetscInt *)a, *q = (const PetscInt *)b;
+
+  if (p[0] != q[0]) return p[0] < q[0] ? -1 : 1;
+  return (p[1] > q[1]) - (p[1] < q[1]);
+}
+
+/* Whether every edge (2D: end) of a group's facets at the nodes of this rank joins two of them. */
+static PetscErrorCode IsClosed(HycoMesh m, PetscInt group, PetscBool *closed)
+{
+  const PetscInt corners = HycoCellKinds[m->type].corners;
+  PetscInt *end, n = 0;
+
+  PetscFunctionBegin;
+  *closed = PETSC_TRUE;
+  PetscCall(PetscMalloc1(4 * m->n_facets * corners + 1, &end));
+  for (PetscInt k = 0; k < m->n_facets * corners; k++) {
+    const PetscInt *node = m->facets + k / corners * m->nf, a = node[k % corners], b = node[(k + 1) % corners];
+
+    /* A collapsed quadrilateral has an edge of one node. */
+    if (m->facet_group[k / corners] != group || a == b) continue;
+    for (PetscInt e = 0; e < (m->dim > 2 ? 2 : 1); e++) {
+      if (HycoMeshOwned(m, e ? b : a) < 0) continue;
+      end[2 * n] = e ? b : a;
+      end[2 * n++ + 1] = m->dim < 3 ? 0 : e ? a : b;
+    }
+  }
+  if (n) qsort(end, (size_t)n, 2 * sizeof(*end), CompareEnds);
+  for (PetscInt k = 0, next; k < n; k = next) {
+    for (next = k + 1; next < n && !CompareEnds(end + 2 * k, end + 2 * next);) next++;
+    if (next < k + 2) *closed = PETSC_FALSE;
+  }
+  PetscCall(PetscFree(end));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* At nodes of this rank, all of whose facets are here. */
 PetscErrorCode HycoContactEdges(HycoScene scene, HycoMesh m, HycoContact c, PetscInt *edges)
 {
+  PetscBool closed;
+
   PetscFunctionBegin;
   *edges = 0;
   PetscCall(HycoSurfaceSides(scene, m));
@@ -207,6 +247,9 @@ PetscErrorCode HycoContactEdges(HycoScene scene, HycoMesh m, HycoContact c, Pets
       if (m->facet_group[k / m->nf] == g && m->facet_side[k] >= 0 && HycoMeshOwned(m, m->facets[k]) >= 0)
         *edges |= of ? HYCO_MASTER_EDGE : HYCO_SLAVE_EDGE;
     }
+    if (of || m->dim == 1) continue;
+    PetscCall(IsClosed(m, g, &closed));
+    if (closed || *edges) *edges |= HYCO_SLAVE_ROUND;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -465,7 +508,7 @@ PetscErrorCode HycoContactSlaves(HycoFE fe, const HycoPairs *pairs, PetscInt ind
   PetscCall(PetscMalloc1(m->n_nodes, &carries));
   PetscCall(PetscCalloc1(n_nodes, &turned));
   HycoSurfaceCarriers(m, g, carries);
-  if (edges & HYCO_SLAVE_EDGE) PetscCall(FindTurned(fe, c, g, n_nodes, m->group_node + m->group_start[g], turned));
+  if (edges & HYCO_SLAVE_ROUND) PetscCall(FindTurned(fe, c, g, n_nodes, m->group_node + m->group_start[g], turned));
   *n = 0;
   for (PetscInt k = 0; k < n_nodes; k++) {
     const PetscInt i = m->group_node[m->group_start[g] + k];

@@ -1,7 +1,5 @@
 """Slave groups that go round an edge: the whole skin of a body is, as a slave, the part of it that faces the master; a block in a corner has a contact on each side."""
 import os
-import re
-import subprocess
 import sys
 import unittest
 
@@ -11,13 +9,6 @@ from common import SOURCE, Case
 
 sys.path.insert(0, os.path.join(SOURCE, 'tests', 'verify'))
 from grids import Grid  # noqa: E402
-from skins import add_skins  # noqa: E402
-
-# scenes of tests/drawn: options of gmsh, parameters, contacts whose slave is the whole skin. Left out: obstacles on all sides of one body (oring, leafpunch: a
-# node would meet several), slaves whose other faces look at the master from farther than the tolerance (vpad, valveseat), and paths (their contacts are these)
-DRAWN = {'keyway': ('-2', '0.1,0.005,0.005,800', 'floor ceiling shaft_r shaft_l hub_r hub_l'), 'pistonring': ('-2', '3,0.005,0', 'low up face'),
-         'lensring': ('-2', '0.1,0.3,2500', 'top bottom'), 'travel2d': ('-2', None, 'sole'), 'geartooth': ('-2', '0,0.02,1e5', 'flank'),
-         'dovetail': ('-3', '0,0,10,0.005', 'left right top')}
 
 COLUMNS = """
 scene: {mesh: mesh.msh%s}
@@ -104,30 +95,6 @@ class Edges(Case):
                 for outputs in found:
                     for key, value in {'fx': 2, 'fy': 1, 'touch': 2, 'peak': 2, 'low': -2, 'high': -2}.items():
                         self.assertAlmostEqual(outputs[key], value, delta=1e-9, msg=key)
-
-    def test_skins(self):
-        """Scenes of tests/drawn whose slaves are whole skins of their bodies: forces, areas, pressures and outputs to 1e-9; 2D, 3D, axisymmetric, on moved bodies, pairs, surfaces and mortars, given normals."""
-        for name, (dim, mu, contacts) in DRAWN.items():
-            folder = os.path.join(SOURCE, 'tests', 'drawn', name)
-            subprocess.run(['gmsh', dim, os.path.join(folder, f'{name}.geo'), '-format', 'msh22', '-v', '1', '-o', self.path(f'{name}.msh')], check=True, capture_output=True)
-            with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
-                text = file.read()
-            scene, of = self.path(f'{name}.yaml'), {}
-            with open(scene, 'w', encoding='utf-8') as file:
-                file.write(text)
-            for contact in contacts.split():
-                of[contact] = re.search(rf'^  {contact}:.*?slave: (\w+)', text, re.MULTILINE | re.DOTALL)[1]
-            add_skins(self.path(f'{name}.msh'), of.values())
-            if mu is None:
-                mu = ','.join(str((float(a) + float(b)) / 2) for a, b in re.findall(r'range: \[([-\d.e]+), *([-\d.e]+)\]', text))
-            right = self.hyco('solve', '-scene', scene, '-mu', mu)
-            found = self.hyco('solve', '-scene', scene, '-mu', mu, *(word for c, group in of.items() for word in (f'-contact_{c}_slave', f'skin_{group}')))
-            with self.subTest(scene=name):
-                for key, value in right['outputs'].items():
-                    self.assertAlmostEqual(found['outputs'][key], value, delta=1e-9 * max(map(abs, right['outputs'].values())), msg=key)
-                for c, one in right['contacts'].items():
-                    for key in ('force', 'area', 'pressure_max'):
-                        np.testing.assert_allclose(found['contacts'][c][key], one[key], rtol=1e-9, atol=1e-9 * np.max(np.abs(one[key])), err_msg=f'{c} {key}')
 
 
 if __name__ == '__main__':

@@ -49,47 +49,63 @@ static PetscErrorCode CheckSurfaceNormals(HycoContact c, HycoFE fe, const HycoPa
            c->slave, c->master, stated >= 0 ? "larger " : "", c->name, c->master);
 }
 
-/* Whether a contact without a master is left out: one of several sides of its node of which another one has a master,
-   or on a surface that goes round an edge a node that does not look at the master. */
-static PetscErrorCode IsDropped(HycoMasterSearch *t, const HycoQuery *query, const HycoPairs *p, PetscInt first,
-                                PetscInt k, PetscBool *dropped)
+/* Whether a contact without a master is one of several sides of its node of which another one has a master. */
+static PetscBool IsOtherSide(const HycoPairs *p, PetscInt first, PetscInt k)
 {
-  HycoProjection at;
-  HycoVerdict why;
+  PetscBool other = PETSC_FALSE;
+
+  for (PetscInt j = PetscMax(k - HYCO_SIDES, first); j < PetscMin(k + HYCO_SIDES, p->n); j++)
+    other = (PetscBool)(other || (p->slave[j] == p->slave[k] && p->master_start[j + 1] > p->master_start[j]));
+  return other;
+}
+
+/* Why the contacts from `first` on have no master: FOUND, they have one, or are near it. */
+static PetscErrorCode FindReasons(HycoMasterSearch *t, PetscReal tolerance, PetscInt first, const HycoPairs *p,
+                                  PetscInt slave[], PetscBool met[], HycoVerdict why[])
+{
+  const HycoQuery query = {.tolerance = tolerance, .small = tolerance};
+  const PetscBool round = (PetscBool)(t->edges & HYCO_SLAVE_ROUND);
 
   PetscFunctionBegin;
-  *dropped = PETSC_FALSE;
-  if (p->master_start[k + 1] > p->master_start[k]) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt j = PetscMax(k - HYCO_SIDES, first); j < PetscMin(k + HYCO_SIDES, p->n); j++)
-    *dropped = (PetscBool)(*dropped || (p->slave[j] == p->slave[k] && p->master_start[j + 1] > p->master_start[j]));
-  if (*dropped || !(t->edges & HYCO_SLAVE_EDGE)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoMasterSearchReady(t));
-  PetscCall(HycoMasterSearchNearest(t, query, p->slave[k], p->side[k], &at, &why));
-  *dropped = (PetscBool)(why != HYCO_FOUND && why != HYCO_FAR);
+  if (p->n > first && round) PetscCall(HycoMasterSearchReady(t));
+  for (PetscInt k = first; k < p->n; k++) {
+    HycoProjection at;
+
+    slave[k - first] = HycoMasterSearchSlave(t, p->slave[k], HycoSideOf(p->side[k]));
+    met[k - first] = (PetscBool)(p->master_start[k + 1] > p->master_start[k]);
+    why[k - first] = HYCO_FOUND;
+    if (!met[k - first] && round)
+      PetscCall(HycoMasterSearchNearest(t, &query, p->slave[k], p->side[k], &at, &why[k - first]));
+  }
+  if (!p->facts) PetscCall(HycoMasterSearchForgive(t, p->n - first, slave, met, why));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Leaves these out, from contact `first` on. */
+/* Leaves out, from contact `first` on, those without a master that another side of their node has, or, on a surface
+   that goes round, that do not look at the master. */
 static PetscErrorCode DropAlone(HycoMasterSearch *t, PetscReal tolerance, PetscInt first, HycoPairs *p)
 {
-  const HycoQuery query = {.tolerance = tolerance, .small = tolerance};
-  PetscInt *which, n = 0;
+  PetscInt *which, *slave, n = 0;
+  HycoVerdict *why;
+  PetscBool *met;
   HycoPairs kept;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(p->n, &which));
-  for (PetscInt k = 0; k < p->n; k++) {
-    PetscBool dropped = PETSC_FALSE;
-
-    if (k >= first) PetscCall(IsDropped(t, &query, p, first, k, &dropped));
-    if (!dropped) which[n++] = k;
+  PetscCall(PetscMalloc4(p->n, &which, p->n, &slave, p->n, &met, p->n, &why));
+  ierr = FindReasons(t, tolerance, first, p, slave, met, why);
+  for (PetscInt k = 0; k < p->n && !ierr; k++) {
+    if (k < first || met[k - first] ||
+        (!IsOtherSide(p, first, k) && (why[k - first] == HYCO_FOUND || why[k - first] == HYCO_FAR)))
+      which[n++] = k;
   }
-  if (n < p->n) {
-    PetscCall(HycoPairsSelect(p, n, which, NULL, &kept));
-    PetscCall(HycoPairsDestroy(p));
-    *p = kept;
+  if (n < p->n && !ierr) {
+    ierr = HycoPairsSelect(p, n, which, NULL, &kept);
+    if (!ierr) ierr = HycoPairsDestroy(p);
+    if (!ierr) *p = kept;
   }
-  PetscCall(PetscFree(which));
+  PetscCall(PetscFree4(which, slave, met, why));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
