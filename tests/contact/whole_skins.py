@@ -21,7 +21,7 @@ from skins import add_skins  # noqa: E402
 LONG = 'HYCO_LONG' in os.environ
 # scenes of tests/drawn in the suite: a pair of second order far from the other faces, surfaces on slopes, a mortar on a moved body, obstacles round a ring
 QUICK = ('valveseat', 'vpad', 'lensring', 'oring')
-SHARED = {'leafpunch': ('mid', 'stop')}  # contacts that keep their groups: both are parts of one face, whose nodes would be slaves of both
+SHARED = {'leafpunch': ('mid', 'stop'), 'snapplastic': ('stop',)}  # contacts that keep their groups: how far an obstacle reaches along a face only the group says
 SLOW = ('gasket3d', 'loadpress', 'yieldpress')  # paths of half a minute, whose contacts are those of other scenes
 # tests of tests/contact without a skin, and why
 WITHOUT = {'test_slot': 'both groups are of one body, whose skin has the master', 'test_hertz': 'an obstacle as a line of text in one entry'}
