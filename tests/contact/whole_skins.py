@@ -137,6 +137,7 @@ class Solves(Twins):
 
         names = sorted(os.path.basename(f)[:-3] for f in glob.glob(os.path.join(SOURCE, 'tests', 'contact', '*.py')))
         Case.run_raw = classmethod(replayed)
+        sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))  # before modules of tests/verify with the same names
         try:
             for name in [n for n in names if n not in ('edges', 'whole_skins')] if LONG else ('pairing',):
                 unittest.defaultTestLoader.loadTestsFromModule(importlib.import_module(name)).run(unittest.TestResult())
