@@ -3,8 +3,8 @@
 */
 #include "master_search.h"
 
-/* Of cosines: a side of an edge that opposes a facet of the master by so much less than another side at the node is
-   beside it, as the underside of a wedge whose flank lies on the facet. */
+/* Of 1, a cosine, what a side of an edge opposes a facet of the master less than another side at the node: from there
+   on it lies beside the facet, as the underside of a wedge whose flank lies on it (tests/contact/whole_skins.py). */
 #define BESIDE 0.2
 
 /* Whether the direction to a master point misses it: by its angle to the normal, or past the border. */
