@@ -8,12 +8,12 @@
 
 /* Of a function's own norm, what former functions leave of it: the coefficients of a sum then lose at most 5 of 16
    digits, and FIT_TOLERANCE stays attainable. */
-#define INDEPENDENT 1e-5
-#define MIXED       12    /* combinations of the rows by which functions are chosen */
-#define MOST        40    /* functions */
-#define MANY        3000  /* candidates: more take too long */
-#define SAME_VALUE  1e-13 /* of a function's value: 450 eps, two orders of evaluating one expression */
-#define PASSES      3     /* of a solution by a pseudo-inverse */
+#define INDEPENDENT     1e-5
+#define MIXED           12    /* combinations of the rows by which functions are chosen */
+#define MOST            40    /* functions */
+#define MOST_CANDIDATES 3000  /* candidates: more take too long */
+#define SAME_VALUE      1e-13 /* of a function's value: 450 eps, two orders of evaluating one expression */
+#define PASSES          3     /* of a solution by a pseudo-inverse */
 /* Of the square of an expression's norm, left by a sum of others: the square of INDEPENDENT. */
 #define DEPENDENT 1e-10
 
@@ -488,7 +488,7 @@ PetscErrorCode HycoFitFunctions(const HycoAtoms *atoms, PetscInt level, PetscBoo
   PetscFunctionBegin;
   PetscCall(HycoExportFitFree(fit));
   fit->worst = PETSC_MAX_REAL;
-  if (most < 1 || most > MANY) PetscFunctionReturn(PETSC_SUCCESS);
+  if (most < 1 || most > MOST_CANDIDATES) PetscFunctionReturn(PETSC_SUCCESS);
   fit->n = most;
   PetscCall(PetscMalloc1(most, &fit->function));
   PetscCall(PetscMalloc1((size_t)most * (size_t)d->n_points, &value));

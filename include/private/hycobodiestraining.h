@@ -21,7 +21,7 @@ enum {
 #define HYCO_BODIES_SAMPLES 60 /* of bodies that change, without an option */
 /* Of a training's tolerance, what left out terms and single precision may add: a tenth, so that they do not decide. */
 #define HYCO_SHORTENED 0.1
-/* Share of the contacts that costs assume closed: a third of those that face is closed in the examples. */
+/* Share of the contacts that costs assume closed: announced against measured times (tests/models/bodies.py). */
 #define HYCO_ASSUMED_CLOSED 0.3
 
 /* The bodies of a mesh, and how each parameter enters each; on every rank. */

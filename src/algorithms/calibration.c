@@ -3,14 +3,13 @@
 #include <hycoalgorithms.h>
 #include <petscsys.h>
 
-/* Of the square sum of a column: correlated features share the weight, and 20 points determine five of them;
-   calibration on the drawn scenes (tests/models/estimates.py). */
+/* Of the square sum of a column: correlated features share the weight, as ten points determine five of them badly. */
 #define RIDGE 1e-1
 /* Spread of a column of logarithms, below which it is left out: a feature that varies by 1 % explains no error of other
    size. */
 #define CONSTANT_FEATURE 1e-2
-/* Probability that the tolerance limit holds: three of four trainings, as more makes the bounds of 6 points useless
-   (tests/unit, calibration of the drawn scenes). */
+/* Probability that the tolerance limit holds: three of four trainings; more makes the bounds of few points useless
+   (tests/drawn/run). */
 #define CONFIDENCE       0.75
 #define MANY_ABOVE       1   /* which counts if fewer values than this are expected above the quantile */
 #define MOST_LEVERAGE    1.4 /* logarithm by which leaving a point out may raise its own excess: a factor of 4 */

@@ -208,7 +208,7 @@ static void AddColumn(cJSON *json, const char name[], PetscInt n, PetscInt n_col
   }
 }
 
-#define HARDLY 3 /* times: a smaller gain is hardly worth a training */
+#define WORTH_TRAINING 3 /* times: a smaller gain is hardly worth a training */
 
 /* Processor time, which other load of the machine does not change. A training that never pays has no break-even. */
 PetscErrorCode DriverReportGain(cJSON *json, const char point[], PetscReal full, PetscReal reduced, PetscReal training)
@@ -223,9 +223,9 @@ PetscErrorCode DriverReportGain(cJSON *json, const char point[], PetscReal full,
   PetscCall(DriverPrint("gain: a %s takes %.3g ms of CPU at full order, %.3g ms predicted with outputs and estimates: "
                         "%.3g times%s",
                         point, 1e3 * (double)full, 1e3 * (double)reduced, (double)times,
-                        times < 1        ? "; this model is slower"
-                        : times < HARDLY ? "; this model gains little"
-                                         : ""));
+                        times < 1                ? "; this model is slower"
+                        : times < WORTH_TRAINING ? "; this model gains little"
+                                                 : ""));
   if (after > 0) PetscCall(DriverPrint("; the training pays from %.0f %ss on", ceil((double)after), point));
   PetscCall(DriverPrint("\n"));
   PetscFunctionReturn(PETSC_SUCCESS);

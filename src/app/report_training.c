@@ -175,7 +175,7 @@ static void KeepFastest(Search *s, const HycoAttempt *a)
   if (!s->fastest.number || a->cost < s->fastest.cost) s->fastest = *a;
 }
 
-#define FASTER 2 /* times: a smaller gain is none to mention */
+#define WORTH_MENTIONING 2 /* times: a smaller gain is none to mention */
 /* Target over the error that shall meet it, in an advice: a tenth, since a repeated training differs in the last
    digits. */
 #define WIDER_TARGET 1.1
@@ -189,7 +189,7 @@ static PetscErrorCode PrintFaster(const Search *s, const HycoTraining *t)
   size_t at = 0;
 
   PetscFunctionBegin;
-  if (s->on || !a->number || a->number == t->chosen.number || FASTER * a->cost > t->chosen.cost)
+  if (s->on || !a->number || a->number == t->chosen.number || WORTH_MENTIONING * a->cost > t->chosen.cost)
     PetscFunctionReturn(PETSC_SUCCESS);
   DescribeErrors(IsPath(s), a->held_out.largest, errors);
   for (size_t j = 0; j < (IsPath(s) ? 4 : 3); j++)

@@ -211,8 +211,8 @@ static PetscErrorCode SolveChange(Floating *h, const PetscReal r[], PetscBool ac
 
 /* Of the square of a column, what others leave of it: its length to 1e-6, far above the round-off of normals and below
    their angles on a smooth mesh. */
-#define SPANS 1e-12
-#define FEW   200 /* closed contacts: with more, the primal method, which changes one at a time, takes too long */
+#define SPANS       1e-12
+#define MOST_CLOSED 200 /* closed contacts: with more, the primal method, which changes one at a time, takes too long */
 
 /* The part of column j of A that is independent of `rank` orthonormal Q, as a share of its squared length; it is
    appended to Q if `append`. */
@@ -376,7 +376,7 @@ static PetscErrorCode SemidefiniteImprove(Floating *h, PetscBool active[], Petsc
     if (*status == HYCO_LCP_SOLVED) break;
     corrected = (PetscBool)(whole && worst < 0);
     PetscCall(SolveChange(h, r, active, d, &singular));
-    if (singular || h->k > h->p + FEW) *status = HYCO_LCP_SINGULAR;
+    if (singular || h->k > h->p + MOST_CLOSED) *status = HYCO_LCP_SINGULAR;
     if (singular) break;
     PetscCall(SemidefiniteAdvance(h, d, active, z, &whole));
     (*its)++;

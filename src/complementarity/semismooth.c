@@ -41,8 +41,8 @@
 /* Of the forces, |F|: below it w is computed anew, because the round-off of updates is 1e-14 times some hundred steps.
    */
 #define NEAR_SOLUTION 1e-6
-/* Share of a step, the shortest at first: six halvings; a lap joint took as few iterations as with full steps
-   (scripts/friction). */
+/* Share of a step, the shortest at first: six halvings; with shorter ones only where none of these serves, a lap joint
+   takes the fewest iterations (scripts/bench-friction). */
 #define LEAST_STEP (1. / 64)
 /* Share of a step, the shortest where no longer one decreases |F|: bodies on soft springs run far past the border of
    the cone (tests/contact/friction_random.py). */

@@ -6,7 +6,7 @@
 
 /* -- begin: in exported models too -- */
 /* Distance past the border of a surface as a share of the facet's shortest edge, up to which a slave's master is a
-   point of the border: meshes of one arc by chords differ by less (tests/contact/pairing.py). */
+   point of the border: borders of two meshes of one surface need not meet (tests/contact/pairing.py). */
 #define HYCO_PAST_BORDER 0.1
 /* -- end: in exported models too -- */
 

@@ -11,8 +11,8 @@ typedef struct {
   PetscReal weight[HYCO_FACET_NODES], distance;
 } HycoProjection;
 
-/* Product of two normals up to which they oppose each other: within 72 degrees, as conforming surfaces round an edge of
-   a coarse mesh do (tests/contact/pairing.py). */
+/* Product of two normals up to which they oppose each other: within 72 degrees, since beyond one surface looks along
+   the other rather than at it. */
 #define HYCO_OPPOSED -0.3
 
 /* Of the coordinates' size, or the mesh's length: 45 eps, a mean of positions or a distance. */

@@ -9,8 +9,8 @@
 #include <hycovector.h>
 #include <stdlib.h>
 
-/* Cosine of the angle of two facets, below which they are on two sides: 40 degrees, more than between facets of a
-   smooth surface with nine on a circle. */
+/* Cosine of the angle of two facets, below which they are on two sides: 40 degrees, more than on a circle of ten
+   facets. */
 #define EDGE_COSINE 0.766
 
 /* The facets around a node, as places f * nf + a of facets[], of one group. */

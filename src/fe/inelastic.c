@@ -10,13 +10,13 @@
 #include <hycokinematics.h>
 #include <hycomaterialimpl.h>
 
-#define BATCH   16 /* cells of one body whose points a law evaluates together */
-#define VIRGIN  -1 /* temperature of a point before its first step */
-#define N_PLAIN 4
+#define BATCH              16 /* cells of one body whose points a law evaluates together */
+#define NO_TEMPERATURE_YET -1 /* temperature of a point before its first step */
+#define N_PLAIN            4
 /* Displacements as a share of the mesh's length, at which laws are tried for whether they yield: above any small
    displacement. */
 #define LARGE_DISPLACEMENT 0.3
-#define ROUNDING           256 /* units of round-off in what a stress loses */
+#define STRESS_ROUND_OFFS  256 /* units of round-off in what a stress loses */
 
 struct _n_HycoFEState {
   PetscInt n_cells, *start; /* n_cells + 1 */
@@ -95,7 +95,7 @@ PetscErrorCode HycoFEStateCreate(HycoFE fe, HycoFEState *state)
   for (PetscInt e = 0; e < n; e++) s->start[e + 1] = s->start[e] + nq * PointSize(fe, e);
   PetscCall(PetscCalloc1(s->start[n], &s->value));
   for (PetscInt e = 0; e < n; e++) {
-    for (PetscInt q = 0; q < nq; q++) *PointAt(fe, s, e, q).temperature = VIRGIN;
+    for (PetscInt q = 0; q < nq; q++) *PointAt(fe, s, e, q).temperature = NO_TEMPERATURE_YET;
   }
   PetscCall(ListNames(fe->scene, s));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -230,7 +230,7 @@ static PetscErrorCode InelasticGather(HycoFE fe, const HycoElement *el, Batch *b
       }
       for (PetscInt j = 0; j < n_state; j++) b->state0[i * n_state + j] = from.variable[j];
       /* The first step begins at the temperature at which it ends. */
-      b->temperature0[i] = *from.temperature == VIRGIN ? T : *from.temperature;
+      b->temperature0[i] = *from.temperature == NO_TEMPERATURE_YET ? T : *from.temperature;
       b->temperature[i] = *to.temperature = T;
       *to.thermal = hot;
     }
@@ -566,7 +566,7 @@ static PetscReal InelasticStressLost(HycoFE fe, PetscInt cell, PetscInt q, const
     most = PetscMax(most, PetscAbsReal(s[c]));
   }
   /* An elastic point must have exactly no inelastic stress: modes of round-off would enter the bases. */
-  if (most <= ROUNDING * PETSC_MACHINE_EPSILON * terms)
+  if (most <= STRESS_ROUND_OFFS * PETSC_MACHINE_EPSILON * terms)
     for (PetscInt c = 0; c < ns; c++) s[c] = 0;
   return terms;
 }
@@ -604,7 +604,7 @@ static void GatherPoints(HycoFE fe, const HycoElement *el, PetscInt n, const Pet
     }
     for (PetscInt j = 0; j < n_state; j++) b->state0[i * n_state + j] = from.variable[j];
     /* At a first step the temperature has not changed. */
-    b->temperature0[i] = *from.temperature == VIRGIN ? T : *from.temperature;
+    b->temperature0[i] = *from.temperature == NO_TEMPERATURE_YET ? T : *from.temperature;
     b->temperature[i] = T;
   }
 }

@@ -14,11 +14,11 @@
 
 /* Decrease of the potential as a share of its slope, at which a step is taken: the usual 1e-4 (Nocedal, Wright,
    Numerical Optimization, 3.1). */
-#define ARMIJO    1e-4
-#define SHORTENED 8 /* largest number of halvings of a step */
-#define WORTH     8 /* expected number of further iterations above which a new tangent is made (modified) */
+#define ARMIJO     1e-4
+#define SHORTENED  8 /* largest number of halvings of a step */
+#define RENEW_FROM 8 /* expected number of further iterations above which a new tangent is made (modified) */
 /* Iterations of a step of elastic bodies with friction, beyond which only round-off is left. */
-#define FEW             5
+#define FRICTION_ITS    5
 #define LOADS_ROUND_OFF 1e-14 /* of the right-hand side of the contact system, the loads: 45 eps of K U */
 /* Residual of a solve without a factor as a share of the iterate's: three digits an iteration, which Newton's method
    gains anyway (scripts/bench-history). */
@@ -412,12 +412,12 @@ static void NewtonContractionOrder(const Progress *now, PetscInt k, HycoStepAtte
 }
 
 /* Whether a new tangent is cheaper than the iterations that the present one would need. Expected iterations by the
-   last contraction rate against WORTH, in logarithms. */
+   last contraction rate against RENEW_FROM, in logarithms. */
 static PetscBool NewtonIsStalling(HycoPath p, const Progress *now)
 {
   const PetscReal *r = now->residual, target = PetscMax(p->rtol * now->size, now->floor), rate = r[2] / r[1];
 
-  return (PetscBool)(p->kept > 0 && !(rate < 1 && PetscLogReal(target / r[2]) > WORTH * PetscLogReal(rate)));
+  return (PetscBool)(p->kept > 0 && !(rate < 1 && PetscLogReal(target / r[2]) > RENEW_FROM * PetscLogReal(rate)));
 }
 
 /* Updates K at U. The evaluation at U gave no tangents; residuals are kept, as U is the same. For the modified method:
@@ -442,7 +442,7 @@ static PetscErrorCode NewtonIterate(HycoPath p, PetscReal t0, PetscReal t1, Hyco
 {
   const PetscBool tangent = (PetscBool)(method == HYCO_NEWTON_TANGENT);
   const PetscBool one = (PetscBool)(p->has_friction && !p->flows); /* one system is the solution */
-  const PetscInt most = p->max_its ? p->max_its : one ? FEW : usual_its[method];
+  const PetscInt most = p->max_its ? p->max_its : one ? FRICTION_ITS : usual_its[method];
   Progress now = {.residual = {0, 0, 0}};
   PetscReal least = PETSC_MAX_REAL, worst = 0;
 

@@ -4,8 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Of the mesh's length, the distance of two nodes: single precision in a mesh file, 6e-8, would be above it, the
-   round-off of doubles is far below. */
+/* Of the mesh's length, the distance of two nodes: mesh files have 9 digits or more, and no edge is as short. */
 #define SAME_PLACE 1e-8
 
 /* From the reference simplex to the regular one, inverted. Column by column: J maps from the element's reference

@@ -30,7 +30,7 @@ static const PetscReal VALUES[2] = {3, 5}, SAMPLES[2] = {93, 273}, OF_TURNS[2] =
 /* Speed of decompositions relative to a product of large matrices: announced against measured times
    (tests/models/bodies.py). */
 #define POD_SHARE 0.12
-/* Factor of the ends of the announced range: what the speed of a machine varies by (tests/models/bodies.py). */
+/* Factor of the ends of the announced range: the speed of a machine varies by as much (tests/models/bodies.py). */
 #define RANGE_MARGIN 1.5
 /* Seconds of a solve beside its operations: announced against measured times (tests/models/bodies.py). */
 #define EACH_SOLVE 5e-5

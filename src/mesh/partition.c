@@ -8,7 +8,7 @@
 #include <petscmat.h>
 
 /* A cut contact costs as much as 1000 cut facets (METIS has integer weights). */
-#define HEAVY 1000
+#define CUT_CONTACT_COST 1000
 
 /* Neighbours of each cell in CSR, with the weight of each edge. */
 typedef struct {
@@ -68,7 +68,7 @@ static PetscErrorCode CellGraph(HycoMesh m, PetscInt n_pairs, const PetscInt pai
       const PetscInt at = extra_of[tie[2 * k + side]]++;
 
       graph->adjncy[at] = tie[2 * k + 1 - side];
-      graph->weight[at] = HEAVY;
+      graph->weight[at] = CUT_CONTACT_COST;
     }
   }
   METIS_Free(x);

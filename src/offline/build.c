@@ -809,9 +809,9 @@ static PetscErrorCode DrawHeld(HycoReducer t, PetscInt count, PetscInt together,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define CLOSE   2  /* held-out points at which each contact shall have a force, or a ninth of them if more; */
-#define FURTHER 12 /* at most so many more are drawn for that, */
-#define AMONG   64 /* those with the smallest gaps among so many */
+#define LEAST_CLOSED 2  /* held-out points at which each contact shall have a force, or a ninth of them if more; */
+#define FURTHER      12 /* at most so many more are drawn for that, */
+#define NEAREST_GAPS 64 /* those with the smallest gaps among so many */
 
 /* The scene's contact that has a force at the fewest of the held-out points, and at how many. Rank 0. */
 static PetscErrorCode CountClosed(HycoReducer t, HycoSnapshots store, PetscInt *which, PetscInt *least)
@@ -880,12 +880,12 @@ static PetscErrorCode FindGaps(HycoReducer t, PetscInt which, PetscInt n, const 
 static PetscErrorCode DrawClosed(HycoReducer t, PetscInt which)
 {
   HycoSamples drawn;
-  PetscInt n, n_par, order[AMONG];
-  PetscReal gap[AMONG];
+  PetscInt n, n_par, order[NEAREST_GAPS];
+  PetscReal gap[NEAREST_GAPS];
   const PetscReal *mu;
 
   PetscFunctionBegin;
-  PetscCall(DrawHeld(t, AMONG, 1, &drawn));
+  PetscCall(DrawHeld(t, NEAREST_GAPS, 1, &drawn));
   PetscCall(HycoSamplesGet(drawn, &n, &n_par, &mu));
   HycoOnRoot(HycoComm(t), FindGaps(t, which, n, mu, gap));
   HycoBcast(gap, n, MPIU_REAL, HycoComm(t));
@@ -912,7 +912,7 @@ static PetscErrorCode SolveHeld(HycoReducer t, HycoSnapshots store)
 
     HycoOnRoot(HycoComm(t), CountClosed(t, store, &closed[0], &closed[1]));
     HycoBcast(closed, 2, MPIU_INT, HycoComm(t));
-    if (closed[1] >= PetscMax(CLOSE, first / 9)) break;
+    if (closed[1] >= PetscMax(LEAST_CLOSED, first / 9)) break;
     PetscCall(DrawClosed(t, closed[0]));
     PetscCall(HycoReducerSolve(t, store, t->held));
     PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));

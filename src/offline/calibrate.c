@@ -13,11 +13,11 @@
 #include <math.h>
 #include <stdio.h>
 
-/* Share of the held-out errors that estimates bound: 0.93, so that 0.9 of each drawn scene's unseen points are bounded
-   (tests/models/estimates.py). */
+/* Share of the held-out errors that estimates bound: more than the 0.9 that is promised, which each drawn scene then
+   reaches at unseen points (tests/drawn/run). */
 #define BOUNDED_SHARE 0.93
-/* Factor of the estimates, because the settings were chosen by the same points: drawn scenes
-   (tests/models/estimates.py). */
+/* Factor of the estimates, because the settings were chosen by the same points: errors at unseen points of drawn scenes
+   (tests/drawn/run). */
 #define CHOICE_MARGIN 1.2
 #define LEAST         10 /* smallest number of predictions for a formula */
 /* Share of a feature's median, its floor: a smaller feature is no sign of a smaller error. */

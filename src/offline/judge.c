@@ -118,11 +118,11 @@ static PetscErrorCode JudgeAll(HycoReducer t, HycoROM m, PetscReal most, HycoJud
 }
 
 /* Smallest number of paths after which a race is decided. */
-#define RACED 3
+#define LEAST_RACED 3
 
 /* Predicts the training paths one by one, and stops when this model has lost: its sum of errors reaches that of the
-   best settings over all paths, or, from RACED paths on, theirs over the same paths. A mean over all paths is compared,
-   so that the sum may stop as soon as it is reached: errors are not negative. */
+   best settings over all paths, or, from LEAST_RACED paths on, theirs over the same paths. A mean over all paths is
+   compared, so that the sum may stop as soon as it is reached: errors are not negative. */
 static PetscErrorCode JudgeUntilLost(HycoReducer t, HycoROM m, PetscInt n, const PetscInt order[],
                                      const HycoJudged best[], PetscReal most, HycoJudged judged[], PetscBool *lost)
 {
@@ -142,7 +142,7 @@ static PetscErrorCode JudgeUntilLost(HycoReducer t, HycoROM m, PetscInt n, const
     PetscCall(JudgeSample(t, m, i, mu + i * n_par, &judged[i]));
     mine += judged[i].u;
     its += best ? best[i].u : 0;
-    *lost = (PetscBool)(mine >= all || (best && k + 1 >= RACED && mine >= its));
+    *lost = (PetscBool)(mine >= all || (best && k + 1 >= LEAST_RACED && mine >= its));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -6,7 +6,7 @@
 */
 #include <hycoreducerimpl.h>
 
-#define FEW        5e10 /* operations that take seconds: a search with no more is not limited */
+#define FREE_WORK  5e10 /* operations that take seconds: a search with no more is not limited */
 #define LAW        20   /* operations for an entry of a cell's stiffness or tangent */
 #define SUBSTEPS   2    /* time steps of a path for each listed time, */
 #define ITERATIONS 2    /* and iterations of a step */
@@ -99,6 +99,6 @@ PetscErrorCode HycoReducerSearchBudget(HycoReducer t, PetscReal *operations)
 {
   PetscFunctionBegin;
   PetscCall(HycoReducerSolutionsWork(t, operations));
-  *operations = t->exhaustive ? PETSC_INFINITY : PetscMax(FEW, *operations) * t->search_budget;
+  *operations = t->exhaustive ? PETSC_INFINITY : PetscMax(FREE_WORK, *operations) * t->search_budget;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

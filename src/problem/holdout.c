@@ -10,9 +10,9 @@
 #include <hycoalgorithms.h>
 #include <hycosceneimpl.h>
 
-#define FEW     3       /* parameters of which scattered points have the corners twice as soon */
-#define MOST    15      /* more dimensions have too many corners to count */
-#define BETWEEN 1000003 /* distance of the parts of a sequence that are used for different places */
+#define FEW_PARAMETERS 3       /* parameters of which scattered points have the corners twice as soon */
+#define MOST           15      /* more dimensions have too many corners to count */
+#define BETWEEN        1000003 /* distance of the parts of a sequence that are used for different places */
 
 /* The places of successive points or groups; with few parameters, scattered points have corners AGAIN, else inside. */
 typedef enum { INSIDE, CORNER, FACE, AGAIN, N_PLACES } Place;
@@ -94,7 +94,7 @@ PetscErrorCode HycoSamplesAddScattered(HycoSamples samples, PetscInt count)
     const Place place = (Place)(k % N_PLACES);
     /* On a single axis a face is a corner. */
     const PetscBool face = (PetscBool)(place == FACE && axes.n > 1),
-                    corner = (PetscBool)((place == CORNER || (place == AGAIN && axes.n <= FEW)) &&
+                    corner = (PetscBool)((place == CORNER || (place == AGAIN && axes.n <= FEW_PARAMETERS)) &&
                                          n_corners < HoldoutCorners(axes.n));
     /* Each face has its own part of the sequence, else points on neighbouring faces would be projections of each
        other. */

@@ -748,7 +748,7 @@ static PetscErrorCode FindMesh(HycoScene s, const char folder[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define WIDE 10 /* ratio of a range's ends above which equal steps leave out the lower decades */
+#define WIDE_RANGE 10 /* ratio of a range's ends above which equal steps leave out the lower decades */
 
 /* The parameters whose logarithm is sampled: of a modulus, or of a spring; one that also moves nodes is a length. */
 static void FindWide(HycoScene s)
@@ -763,7 +763,7 @@ static void FindWide(HycoScene s)
     }
     for (PetscInt k = 0; k < 4 * s->n_springs; k++)
       stiff = (PetscBool)(stiff || HycoExprChanges(s->spring[k / 4].stiffness[k % 4], changed));
-    s->wide[p] = (PetscBool)(stiff && !moves && s->lo[p] > 0 && s->hi[p] > WIDE * s->lo[p]);
+    s->wide[p] = (PetscBool)(stiff && !moves && s->lo[p] > 0 && s->hi[p] > WIDE_RANGE * s->lo[p]);
   }
 }
 

@@ -319,7 +319,7 @@ static PetscBool ExceedsSceneResidual(HycoROM m, PetscReal inconsistency)
 #define MANY_HELD_OUT 20.
 #define MOST_UNDER    30
 /* Largest held-out error of paths over an estimate, at most: two fifths of it, since errors peak between paths without
-   a sign in the features (tests/models/estimates.py). */
+   a sign in the features. */
 #define MOST_UNDER_PATH 2.5
 #define MOST_FOLLOWED   10
 

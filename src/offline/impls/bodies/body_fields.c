@@ -13,8 +13,8 @@
 #define MOST_COLUMNS 600 /* of training paths */
 #define MOST_MODES   0.5 /* modes for each sample: with more of them the samples do not show all displacements */
 #define DOUBLINGS    4   /* of the samples with more modes */
-/* Of the displacements at a check, what modes may miss before the samples double, at most UNTIL_SEEN times: a fifth of
-   the 0.1 % that the search takes as accurate enough. */
+/* Of the displacements at a check, what modes may miss before the samples double, at most UNTIL_SEEN times: ten times
+   it, the estimate of u, is then the 0.2 % that the search takes as accurate enough. */
 #define MISSED     2e-4
 #define UNTIL_SEEN 2 /* doublings while the modes miss more than MISSED */
 #define SPREAD     3 /* nodes of theta at which the displacements of each are computed */
@@ -22,10 +22,10 @@
    first compression does not decide. */
 #define TURNED_SHARE 1e-2
 /* Of the largest sample: smaller ones count as much as this; single precision of the stored responses. */
-#define LEAST_SAMPLE 1e-7
-#define SCORED       24 /* displacements at all nodes of theta whose stresses show which cells matter */
-#define MANY         64 /* right-hand sides at once */
-#define SEEN         4  /* times of a path with friction whose forces are samples */
+#define LEAST_SAMPLE    1e-7
+#define SCORED          24 /* displacements at all nodes of theta whose stresses show which cells matter */
+#define COLUMNS_AT_ONCE 64 /* right-hand sides at once */
+#define SAMPLED_TIMES   4  /* times of a path with friction whose forces are samples */
 /* Of the largest response in a column: terms without larger entries are left out; single precision of the stored
    responses. */
 #define SHORT_TERM 1e-7
@@ -87,7 +87,7 @@ static PetscErrorCode SolvePath(HycoBodiesFriction f, HycoBodiesWork o, HycoScen
     PetscCall(HycoBodiesFrictionAccept(f, o, t));
     /* Another time within each quarter for each point: all times are seen, not four of them. */
     /* Samples of forces are spread over the path. */
-    if (t >= first + (last - first) * (seen + SomeShare(k)) / SEEN && seen < SEEN) {
+    if (t >= first + (last - first) * (seen + SomeShare(k)) / SAMPLED_TIMES && seen < SAMPLED_TIMES) {
       PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, o->c, b->r));
       PetscCall(PetscArraycpy(sampled->f + sampled->n * b->ns, o->f, b->ns));
       sampled->n++;
@@ -268,9 +268,9 @@ static PetscErrorCode BodyFieldsSample(HycoReducer t, HycoSnapshots store, HycoF
   PetscCall(HycoSamplesCreate(t->scene, &points));
   PetscCall(HycoSamplesAddPoint(points, b->first));
   /* A path with friction gives several samples, and no checks. */
-  if (t->scene->n_parameters) PetscCall(HycoSamplesAddScattered(points, friction ? n / SEEN : n + CHECKS));
+  if (t->scene->n_parameters) PetscCall(HycoSamplesAddScattered(points, friction ? n / SAMPLED_TIMES : n + CHECKS));
   PetscCall(HycoSamplesGet(points, &n, NULL, NULL));
-  if (friction) n *= SEEN;
+  if (friction) n *= SAMPLED_TIMES;
   if (t->scene->n_times) n += 1 + t->n_s / PathStride(t);
   PetscCall(PetscRealloc(((size_t)n * (size_t)b->r + 1) * sizeof(PetscReal), &sampled->c));
   PetscCall(PetscRealloc(((size_t)n * (size_t)b->ns + 1) * sizeof(PetscReal), &sampled->f));
@@ -310,13 +310,13 @@ static PetscErrorCode DestroyVectors(PetscInt n, Vec v[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The displacements of this rank's part, n columns, at most MANY, for loads with coefficients c (r x n; NULL: none) and
-   the z of the dense problem (p + ns, n columns; read on rank 0). Collective. */
+/* The displacements of this rank's part, n columns, at most COLUMNS_AT_ONCE, for loads with coefficients c (r x n;
+   NULL: none) and the z of the dense problem (p + ns, n columns; read on rank 0). Collective. */
 static PetscErrorCode BodyFieldsExpand(HycoSubstructures b, HycoBodiesFactor *factor, PetscInt n, const PetscReal c[],
                                        const PetscReal z[], PetscReal u[])
 {
   HycoFOM f = factor->fom;
-  Vec F[MANY], x[MANY];
+  Vec F[COLUMNS_AT_ONCE], x[COLUMNS_AT_ONCE];
 
   PetscFunctionBegin;
   PetscCall(CreateVectors(factor, n, F));
@@ -373,10 +373,11 @@ static PetscErrorCode ExpandSamples(HycoReducer t, HycoBodiesFactor *factor, con
   PetscReal *c, *z;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc2(MANY * b->r + 1, &c, (size_t)MANY * (size_t)n_z + 1, &z)); /* z of motions: 0 */
+  PetscCall(PetscCalloc2(COLUMNS_AT_ONCE * b->r + 1, &c, (size_t)COLUMNS_AT_ONCE * (size_t)n_z + 1,
+                         &z)); /* z of motions: 0 */
   /* Several right-hand sides at once: MUMPS reads its factor once for all of them. */
-  for (PetscInt first = 0; first < n; first += MANY) {
-    const PetscInt many = PetscMin(MANY, n - first);
+  for (PetscInt first = 0; first < n; first += COLUMNS_AT_ONCE) {
+    const PetscInt many = PetscMin(COLUMNS_AT_ONCE, n - first);
 
     for (PetscInt j = 0; j < many; j++) {
       const size_t k = (size_t)sample[first + j];
@@ -852,19 +853,19 @@ static PetscErrorCode BodyCoefficients(HycoReducer t, HycoBodiesFactor *factor, 
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   HycoSubstructure *s = &b->body[k];
-  /* Modes in each turn, then the unknowns inside; MANY right-hand sides at once, since MUMPS is several times
+  /* Modes in each turn, then the unknowns inside; COLUMNS_AT_ONCE at once, since MUMPS is several times
      faster on blocks. */
   const PetscInt rows = own->rows;
   PetscReal *H = own->H + (size_t)sample * (size_t)rows * (size_t)s->n;
   PetscReal *a = own->a + (size_t)sample * (size_t)rows * (size_t)(b->r + b->p);
   PetscReal *u, *g;
-  Vec v[MANY];
+  Vec v[COLUMNS_AT_ONCE];
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(MANY * b->ns + 1, &u, MANY * b->p + 1, &g));
-  PetscCall(CreateVectors(factor, MANY, v));
-  for (PetscInt first = 0; first < rows; first += MANY) {
-    const PetscInt many = PetscMin(MANY, rows - first);
+  PetscCall(PetscMalloc2(COLUMNS_AT_ONCE * b->ns + 1, &u, COLUMNS_AT_ONCE * b->p + 1, &g));
+  PetscCall(CreateVectors(factor, COLUMNS_AT_ONCE, v));
+  for (PetscInt first = 0; first < rows; first += COLUMNS_AT_ONCE) {
+    const PetscInt many = PetscMin(COLUMNS_AT_ONCE, rows - first);
 
     for (PetscInt j = 0; j < many; j++) PetscCall(SetRow(t, factor, k, first + j, V, v[j]));
     PetscCall(HycoBodiesReduce(b, factor, many, v, u, g));
@@ -883,7 +884,7 @@ static PetscErrorCode BodyCoefficients(HycoReducer t, HycoBodiesFactor *factor, 
                  ->fields[(StrainRows(b, k) + (size_t)(sample * rows + row)) * (size_t)factor->n_strains + (size_t)d]));
     }
   }
-  PetscCall(DestroyVectors(MANY, v));
+  PetscCall(DestroyVectors(COLUMNS_AT_ONCE, v));
   PetscCall(PetscFree2(u, g));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -8,7 +8,7 @@
 #include <hycobodiestraining.h>
 #include <hycoinelasticpoints.h>
 
-#define MANY 64 /* right-hand sides at once */
+#define COLUMNS_AT_ONCE 64 /* right-hand sides at once */
 
 /* -- unsupported scenes -- */
 
@@ -304,15 +304,15 @@ static PetscErrorCode FillForces(HycoReducer t, HycoBodiesFactor *factor, const 
   PetscReal *work;
   PetscScalar *v;
   PetscInt lo, hi;
-  Vec e[MANY];
+  Vec e[COLUMNS_AT_ONCE];
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(MANY * b->p + 1, &work));
-  for (PetscInt j = 0; j < MANY; j++) PetscCall(VecDuplicate(factor->fom->F, &e[j]));
+  PetscCall(PetscMalloc1(COLUMNS_AT_ONCE * b->p + 1, &work));
+  for (PetscInt j = 0; j < COLUMNS_AT_ONCE; j++) PetscCall(VecDuplicate(factor->fom->F, &e[j]));
   PetscCall(VecGetOwnershipRange(e[0], &lo, &hi));
-  for (PetscInt first = 0; first < at->n; first += MANY) {
+  for (PetscInt first = 0; first < at->n; first += COLUMNS_AT_ONCE) {
     /* A block of unit loads per solve; the last block may be smaller. */
-    const PetscInt many = PetscMin(MANY, at->n - first);
+    const PetscInt many = PetscMin(COLUMNS_AT_ONCE, at->n - first);
 
     for (PetscInt j = 0; j < many; j++) {
       const PetscInt row = at->global[first + j];
@@ -328,7 +328,7 @@ static PetscErrorCode FillForces(HycoReducer t, HycoBodiesFactor *factor, const 
     PetscCall(PetscArraycpy(b->inelastic->Z + first * b->p, work, many * b->p));
     PetscCall(HycoReducerTell(t, "displacements of the cells with laws", first + many, at->n));
   }
-  for (PetscInt j = 0; j < MANY; j++) PetscCall(VecDestroy(&e[j]));
+  for (PetscInt j = 0; j < COLUMNS_AT_ONCE; j++) PetscCall(VecDestroy(&e[j]));
   PetscCall(PetscFree(work));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

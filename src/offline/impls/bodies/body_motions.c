@@ -10,12 +10,11 @@
 
 #define MOST_VALUES 17  /* of a parameter, */
 #define MOST_POINTS 400 /* and in all */
-/* Of the largest number of its kind, the table's error: 450 eps, a polynomial of 17 values; no more values are tried.
-   */
+/* Of the largest number of its kind, the table's error: 450 eps, a polynomial of 17 values; then no more are tried. */
 #define TABLE_EXACT 1e-13
 /* Of the largest number of its kind, the table's error: equilibrium would miss as much, and its residual is 1e-8. */
-#define TABLE_ROUGH 1e-8
-#define FAR         1e4 /* largest coefficient of a motion that moves a pin by 1, beside a body's size */
+#define TABLE_ROUGH         1e-8
+#define LARGEST_COEFFICIENT 1e4 /* largest coefficient of a motion that moves a pin by 1, beside a body's size */
 
 /* Whether body k has a part in the table. */
 static PetscBool BodyMotionsVaries(HycoSubstructures b, const HycoBodiesFactor *factor, PetscInt k)
@@ -83,8 +82,9 @@ static PetscErrorCode TakeCoefficients(HycoSubstructures b, const HycoMotions *m
     for (PetscInt a = 0; a < 6; a++) own[a] = PetscAbsReal(own[a]) > PETSC_MACHINE_EPSILON * largest ? own[a] : 0;
     most = PetscMax(most, largest);
   }
-  HycoCheckModel(most < FAR, "a body that contact alone holds changes its shape so that its rigid motions need other "
-                             "unknowns, which a model of bodies does not support; train a hybrid model");
+  HycoCheckModel(most < LARGEST_COEFFICIENT,
+                 "a body that contact alone holds changes its shape so that its rigid motions need other "
+                 "unknowns, which a model of bodies does not support; train a hybrid model");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -13,7 +13,7 @@
 #define MOST_ERROR 0.3
 #define ITERATIONS 30 /* of the power method */
 /* Of the flexibility, e at held-out samples: below it no more samples than HYCO_BODIES_SAMPLES are added, which make
-   predictions slower; a tenth of the 0.1 % of accurate models. */
+   predictions slower; a hundredth of the 1 % of forces that the search takes as accurate enough. */
 #define SMALL_ERROR  1e-4
 #define MOST_CHEAP   500 /* samples, where they are cheap; */
 #define MOST_NUMBERS 2e7 /* numbers of their flexibilities, at most */

@@ -418,7 +418,7 @@ static PetscErrorCode FreeUnknowns(HycoReducer t, HycoROM m, PetscBool contact_o
 }
 
 /* Number of successive worse ridges that end the race of paths: above the best the errors grow with the ridge. */
-#define LOST 3
+#define WORSE_RIDGES 3
 
 /* The ridge for paths: each trial takes seconds, and some of the paths suffice to reject a ridge that is worse than
    the best. Fails if an attempt of the search has training errors of one half with any ridge. */
@@ -432,7 +432,7 @@ static PetscErrorCode EarlyStopRidges(HycoReducer t, HycoROM m, PetscReal *stren
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, &n, NULL, NULL));
   PetscCall(PetscMalloc2(n, &judged, n, &its));
-  for (PetscReal ridge = 1e-14; ridge < 1e-5 && in_a_row < LOST; ridge *= 10) {
+  for (PetscReal ridge = 1e-14; ridge < 1e-5 && in_a_row < WORSE_RIDGES; ridge *= 10) {
     PetscReal u;
     PetscBool lost;
 
@@ -440,7 +440,7 @@ static PetscErrorCode EarlyStopRidges(HycoReducer t, HycoROM m, PetscReal *stren
     PetscCall(HycoGalerkinSetRidge(m, ridge));
     PetscCall(HycoReducerJudgeEarlyStop(t, m, any ? its : NULL, t->trying ? HYCO_USELESS_ERROR : PETSC_INFINITY, judged,
                                         &u, &lost));
-    /* Errors have one minimum over the ridge as a rule: after LOST worse ones in a row the search ends. */
+    /* Errors have one minimum over the ridge as a rule: after WORSE_RIDGES worse ones in a row the search ends. */
     in_a_row += any;
     if (lost || !(u < least)) continue;
     /* The errors of the best so far, by path: the next ridge races against them. */

@@ -11,17 +11,17 @@
 #include <string.h>
 
 #define ROUNDS 60 /* of joining contacts */
-/* Of the deepest penetration without forces: contacts that are deeper are in the first problem; half, as few rounds are
-   added by it (scripts/bench-online). */
+/* Of the deepest penetration without forces: contacts that are deeper are in the first problem; half, as the others
+   join in a round or two. */
 #define FIRST_DEPTH    0.5
 #define NO_PENETRATION 1e-13 /* of the largest gap: 450 eps, a row of B times the displacements */
 /* Of the differences of depth, where all contacts are closed without forces: the nearest tenth is in the first problem
    (391 contacts, of which 9 to 87 closed, were all). */
 #define NEAREST_DEPTH 0.1
 /* Of the depth: 4.5e6 eps; smaller differences of depth do not choose the first problem. */
-#define FLAT_DEPTH 1e-9
-#define COARSE     4  /* one of so many contacts is in the first problem of bodies that contact alone holds */
-#define FEW        64 /* contacts that are all in it */
+#define FLAT_DEPTH    1e-9
+#define COARSE_STRIDE 4  /* one of so many contacts is in the first problem of bodies that contact alone holds */
+#define SMALL_PROBLEM 64 /* contacts that are all in it */
 
 /* `weight`, `share` and `blend` hold one array per body, and `bodies` has their number; the zeros afterwards make a
    second call, and HycoBodiesSetUp() on the same work, safe. */
@@ -878,8 +878,8 @@ static void TakeEvery(HycoBodiesWork o, const HycoBodiesSurface *s, PetscInt str
 }
 
 /* The first problem: the deepest contacts. Without the contacts that alone hold a body there is no depth: then one of
-   COARSE contacts, whose forces push the bodies together about as those of all do, so that the contacts which these
-   bodies still meet are few more than those that close. */
+   COARSE_STRIDE contacts, whose forces push the bodies together about as those of all do, so that the contacts which
+   these bodies still meet are few more than those that close. */
 static PetscErrorCode BodiesSolveBegin(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal size, PetscBool in[],
                                        Problem *p)
 {
@@ -889,7 +889,7 @@ static PetscErrorCode BodiesSolveBegin(HycoBodiesWork o, const HycoBodiesSurface
   PetscFunctionBegin;
   if (o->bodies->p) {
     for (PetscInt k = 0; k < s->n; k++) n += o->row_start[k] < o->row_start[k + 1];
-    TakeEvery(o, s, n > FEW ? COARSE : 1, in, p);
+    TakeEvery(o, s, n > SMALL_PROBLEM ? COARSE_STRIDE : 1, in, p);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscMalloc1(s->fe->scene->n_contacts, &least));

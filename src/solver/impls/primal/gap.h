@@ -4,8 +4,8 @@
 
 #include <hycosolverimpl.h>
 
-/* Share of contacts among the unknowns, above which there is an obstacle along a whole body: a rope has a half, the
-   surface of a solid less than a tenth. */
+/* Share of contacts among the unknowns, above which there is an obstacle along a whole body: a rope has a contact for
+   each, a solid for less than a tenth. */
 #define HYCO_MANY_SHARE 0.25
 
 /* Data of the form. */
