@@ -32,16 +32,11 @@
 #define OUTPUTS_AGREE 1e-9
 /* Of an output's largest value, program against model, of bodies that flow: ten times OUTPUTS_AGREE, because a path
    adds up what Newton's method leaves in its steps. */
-#define FLOWS_AGREE 1e-8
-/* Of the forces of a step, in program and model: what Newton's method leaves adds up over 1000 steps to a tenth of
-   FLOWS_AGREE. */
-#define NEWTON_RTOL   1e-12
+#define FLOWS_AGREE   1e-8
 #define PLACES        6 /* at which expressions in space are functions of the parameters */
 #define MOST          6000000
 #define MOST_ITEMS    3000
 #define PATHS_CHECKED 8 /* or so many paths */
-/* Of the forces, a program's residual along a path: the default of -hyco_solver_rtol. */
-#define PATH_TOLERANCE 1e-8
 /* Of what the same force moves in its block: the round-off of a solve with a factor; such a tangent is held. */
 #define HELD_ROW 1e-12
 /* Of the largest coefficient of a load: the round-off of a sum of thousands of terms. */
@@ -1251,12 +1246,12 @@ static PetscErrorCode ExportPrepare(Export *e)
   PetscCall(HycoTravelCreate(m, &e->out, &e->travel));
   e->l = e->s->n_times ? ((HycoSubstructures)m->model->data)->inelastic->m : 0;
   PetscCall(FindProblem(e, mu));
-  e->out.m.tolerance = e->s->n_times ? PATH_TOLERANCE : m->solver->rtol;
+  e->out.m.tolerance = e->s->n_times ? HYCO_RESIDUAL : m->solver->rtol;
   if (e->s->n_times)
     e->out.m.least = ((HycoBodiesPath)m->work)->path->smallest * (e->s->times[e->s->n_times - 1] - e->s->times[0]);
   PetscCall(HycoROMMeasureQuantities(m, &(HycoPrediction){0}));
   PetscCall(HycoFlowsCreate(m, &e->out, &e->flows));
-  e->out.m.newton_rtol = PetscMin(e->out.m.newton_rtol, NEWTON_RTOL);
+  e->out.m.newton_rtol = PetscMin(e->out.m.newton_rtol, HYCO_TIGHT_NEWTON);
   PetscCall(FindOutputs(e));
   e->travel_row = e->n_rows;
   for (PetscInt b = 0; b < e->out.m.n_slip; b++) {
@@ -1313,7 +1308,7 @@ static PetscErrorCode ExportBuild(Export *e)
   e->out.n_states = (PetscInt)state_size(&e->out.m);
   PetscCall(PetscMalloc1(e->out.n_states, &e->state));
   PetscCall(PetscMalloc1(work_size(&e->out.m) + 1, &memory));
-  e->m->trace.rtol = NEWTON_RTOL;
+  e->m->trace.rtol = HYCO_TIGHT_NEWTON;
   HycoFinally(ExportCompare(e, &e->out.m, memory), PetscCall(PetscFree(memory)); e->m->trace.rtol = 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

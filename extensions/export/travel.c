@@ -6,7 +6,7 @@
 
 #define POINTS 9 /* at which it is found out which bodies turn and which displacements are prescribed */
 /* Of an entry of Q, which is at most 1: 4500 eps, the fit of a rotation to thousands of nodes. */
-#define TURNED 1e-12
+#define TURNED_ENTRY 1e-12
 
 PetscErrorCode HycoTravelDestroy(HycoTravel *travel)
 {
@@ -330,7 +330,7 @@ static PetscErrorCode FindMotions(HycoTravel t, PetscBool moves[], PetscBool tur
       moves[k] = (PetscBool)(moves[k] || (fe->fixed[k] && fe->u0[k] != 0));
     for (PetscInt k = 0; k < 9 * t->bodies->bodies->n && !ierr; k++)
       turns[k / 9] =
-          (PetscBool)(turns[k / 9] || PetscAbsReal(t->bodies->pose[k / 9].Q[k % 9] - (k % 9 % 4 == 0)) > TURNED);
+          (PetscBool)(turns[k / 9] || PetscAbsReal(t->bodies->pose[k / 9].Q[k % 9] - (k % 9 % 4 == 0)) > TURNED_ENTRY);
   }
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(ierr);

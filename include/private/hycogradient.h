@@ -27,7 +27,7 @@ typedef struct _n_HycoDifference {
 #define HYCO_GRADIENT_STEP   3e-5
 #define HYCO_GRADIENT_CLOSER 2 /* differences of a quarter of the step, where slopes jump */
 /* Step as a share of a parameter's range, of differences of paths: their round-off is that of Newton's method
-   (HYCO_GRADIENT_RTOL), 1e-8 of a slope, as is the square of the step. */
+   (HYCO_TIGHT_NEWTON), 1e-8 of a slope, as is the square of the step. */
 #define HYCO_GRADIENT_PATH_STEP 1e-4
 /* Central where the range has room for it, else of the same order to the inside. share: the step's, of the range. */
 void HycoDifferenceSet(HycoScene scene, const PetscReal mu[], PetscInt parameter, PetscReal share,
@@ -63,9 +63,6 @@ PetscErrorCode HycoGradientColumn(HycoGradient *gradient, HycoGradientStore *sto
 
 /* most[n_quantities]: the largest of each output at the listed times, without its sign. */
 void HycoPathLargest(HycoScene scene, const HycoStep step[], PetscReal most[]);
-/* Of the forces of a step, Newton's method on the perturbed paths: 4500 eps, the least that it reaches on thousands of
-   unknowns. */
-#define HYCO_GRADIENT_RTOL 1e-12
 /* Solves the path at mu in the steps of the solution, as far as its end, without monitors and files; *step: at its
    n_times listed times, with the outputs. Borrowed until the next call. */
 typedef PetscErrorCode (*HycoGradientFollow)(void *context, const PetscReal mu[], const HycoStep *step[]);

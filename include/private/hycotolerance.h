@@ -16,6 +16,9 @@
 
 /* -- forces, gaps and their balance -- */
 
+/* Of forces, or of gaps, their residuals: the default of -hyco_solver_rtol, and that of what is not solved by a
+   HycoSolver. */
+#define HYCO_RESIDUAL 1e-8
 /* Of the largest contact force: 4.5e5 eps, the solve with a factor of a flexibility whose condition is 1e5. */
 #define HYCO_FORCE_ROUND_OFF 1e-10
 /* Of the largest force, or of the largest gap: ten times the tolerance of the residuals, 1e-8; a contact with less may
@@ -55,6 +58,9 @@
 
 /* -- methods -- */
 
+/* Of the forces of a step, Newton's method where a path is compared with another, a perturbed one or a program's: 4500
+   eps, the least that it reaches on thousands of unknowns. */
+#define HYCO_TIGHT_NEWTON 1e-12
 /* Residual over that before, of an iteration with the factor of another matrix, above which the factor is made again:
    iterations that contract by five cost less than a factor, 28 to 38 % of a path of the rod (scripts/friction-rod). */
 #define HYCO_LAGGED_CONTRACTION 0.2

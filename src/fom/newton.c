@@ -460,7 +460,7 @@ static PetscErrorCode NewtonIterate(HycoPath p, PetscReal t0, PetscReal t1, Hyco
     if (k && now.residual[2] <= PetscMax(p->rtol * now.size, now.floor)) {
       PetscCall(NewtonJudge(p, &now, a, &worst));
       /* Of the contacts' residuals, which are relative. */
-      a->converged = (PetscBool)(worst <= 1e-8);
+      a->converged = (PetscBool)(worst <= HYCO_RESIDUAL);
       if (a->converged && p->ops->judge) PetscCall((*p->ops->judge)(p, HYCO_CONVERGED, a->why));
       a->converged = (PetscBool)(a->converged && !a->why[0]);
       if (a->converged || a->why[0]) break;

@@ -50,7 +50,7 @@ static PetscErrorCode PathGradientFollow(void *context, const PetscReal mu[], co
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  p->rtol = PetscMin(rtol, HYCO_GRADIENT_RTOL);
+  p->rtol = PetscMin(rtol, HYCO_TIGHT_NEWTON);
   p->n_given = o->n;
   p->given = o->taken;
   ierr = PathGradientSolve(o->f, mu);

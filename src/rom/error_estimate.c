@@ -65,8 +65,7 @@ static const PetscReal slight[HYCO_FEATURES] = {1e-6, 1e-6, 1e-3, 0, 0, 1e-7, 0.
 #define INCONSISTENT 1e-3
 /* Of the largest displacement of closed contacts, the same in a model without held-out points: ten times INCONSISTENT.
    */
-#define UNJUDGED   1e-2
-#define UNBALANCED 1e-8 /* of the forces, their balance: the residual of solves, 1e-8 */
+#define UNJUDGED 1e-2
 
 /* Of sums of squares; x / 0 counts as 1, a full error, and stays finite for the formulas. */
 static PetscReal EstimateQuotient(PetscReal part2, PetscReal size2)
@@ -471,7 +470,7 @@ PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
   /* Forces that had to be changed so much to balance, or do not balance, are wrong by about that. */
   p->unbalanced =
       (PetscBool)(p->balance >
-                  PetscMax(UNBALANCED, p->estimated_error_lambda < 0 ? UNJUDGED : p->estimated_error_lambda));
+                  PetscMax(HYCO_RESIDUAL, p->estimated_error_lambda < 0 ? UNJUDGED : p->estimated_error_lambda));
   if (p->estimated_error_lambda >= 0)
     p->estimated_error_lambda = PetscMax(p->estimated_error_lambda, PetscMax(m->corrected, m->imbalance));
   /* Full order may find other nodal forces, as far away as they are. */

@@ -21,7 +21,7 @@ static PetscErrorCode PathGradientFollow(void *context, const PetscReal mu[], co
   PetscFunctionBegin;
   /* The difference of two paths is a small share of either: what Newton's method leaves must be small beside it.
      */
-  trace->rtol = HYCO_GRADIENT_RTOL;
+  trace->rtol = HYCO_TIGHT_NEWTON;
   trace->n_given = o->n;
   trace->given = o->taken;
   ierr = HycoROMPredict(o->m, o->m->model->scene->n_parameters, mu);

@@ -40,7 +40,7 @@ PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver)
   PetscCall(HycoPackageCheck());
   PetscCall(PetscHeaderCreate(*solver, HYCO_SOLVER_CLASSID, "HycoSolver", "Solver of contact systems", "Hyco", comm,
                               HycoSolverDestroy, HycoSolverView));
-  (*solver)->rtol = 1e-8;
+  (*solver)->rtol = HYCO_RESIDUAL;
   (*solver)->warm = PETSC_TRUE;
   (*solver)->fallback = PETSC_TRUE;
   /* -hyco_solver_multilevel false: the active set starts without contact. */

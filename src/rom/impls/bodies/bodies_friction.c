@@ -14,10 +14,9 @@
 #include <hycoalgorithms.h>
 #include <hycolcp.h>
 
-#define SOLVED 1e-8 /* of forces and gaps, the residual of the contacts: the default of -hyco_solver_rtol */
 /* Change of a piece of the law up to which the derivative of the forces is kept: the rod takes 28 to 38 % less time
    with the results of before to 1e-10 (scripts/friction-rod). */
-#define TURNED 0.02
+#define TURNED_PIECE 0.02
 
 /* The surface with tangents, whose rows are those of each step. */
 static PetscErrorCode CreateSurface(HycoBodiesFriction f)
@@ -166,7 +165,7 @@ PetscErrorCode HycoBodiesFrictionPrepare(HycoBodiesFriction f, HycoBodiesWork o,
 static PetscErrorCode BodiesFrictionMeasure(HycoBodiesFriction f, HycoBodiesWork o, const PetscReal L[], HycoKKT *kkt)
 {
   /* Below it gaps are round-off of the coordinates. */
-  PetscReal size = HYCO_NOTHING / SOLVED * HycoMeshLength(f->normal.fe->mesh), force = 0;
+  PetscReal size = HYCO_NOTHING / HYCO_RESIDUAL * HycoMeshLength(f->normal.fe->mesh), force = 0;
   HycoNaturalMap map;
 
   PetscFunctionBegin;
@@ -290,7 +289,7 @@ PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction f, HycoBodiesWork o, P
   PetscFunctionBegin;
   PetscCall(HycoBodiesFrictionSolveContact(f, o, t, NULL, PETSC_FALSE, its, solved));
   PetscCall(HycoBodiesFrictionMove(f, o, kkt));
-  *solved = (PetscBool)(*solved && HycoKKTMax(kkt) <= SOLVED);
+  *solved = (PetscBool)(*solved && HycoKKTMax(kkt) <= HYCO_RESIDUAL);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -436,7 +435,7 @@ PetscErrorCode HycoBodiesFrictionDerive(HycoBodiesFriction f, PetscInt m, const 
 
     /* Slips that turn change the map a little, and the rounds of the search correct it; other states by much more. */
     for (PetscInt i = 0; i < n_pieces && near; i++)
-      near = (PetscBool)(PetscAbsReal(pieces[i] - f->pieces[i]) <= TURNED);
+      near = (PetscBool)(PetscAbsReal(pieces[i] - f->pieces[i]) <= TURNED_PIECE);
     if (near) PetscFunctionReturn(PETSC_SUCCESS);
   }
   *changed = PETSC_TRUE;

@@ -60,7 +60,7 @@ static PetscErrorCode BodiesPathState(HycoROM m, PetscReal t0, PetscReal t1, con
   p->kkt.stationarity = PetscMax(p->kkt.stationarity, a->residual);
   /* Recomputed from U and Lambda: the search's own word is not enough. */
   residual = PetscMax(w->friction ? HycoKKTMax(&p->kkt) : residual, a->residual);
-  a->converged = (PetscBool)(residual <= 1e-8);
+  a->converged = (PetscBool)(residual <= HYCO_RESIDUAL);
   if (!a->converged) HycoFormat(a->why, "the residual of the contacts is %.1e", (double)residual);
   if (!a->converged && p->no_equilibrium[0]) HycoFormat(a->why, "%s", p->no_equilibrium);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -9,8 +9,6 @@
 #include <hycoentries.h>
 #include <hycolcp.h>
 
-#define RETURNED 1e-8 /* of the forces: their residual, 1e-8; a step solved again has those of the path */
-
 struct _n_HycoBodiesSensitivity {
   HycoRows rows;            /* beside the path, with tangents, */
   PetscReal *tangent, *mu;  /* 6 n_contacts; 5 x n_contacts: coefficients, by point */
@@ -100,7 +98,8 @@ static PetscErrorCode BodiesTangentFind(HycoBodiesFriction f, HycoBodiesWork o, 
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(HycoBodiesFrictionSolveContact(f, o, 0, alpha, PETSC_TRUE, &its, able));
-  for (PetscInt i = f->p; i < N; i++) *able = (PetscBool)(*able && PetscAbsReal(f->z[i] - taken[i]) <= RETURNED * most);
+  for (PetscInt i = f->p; i < N; i++)
+    *able = (PetscBool)(*able && PetscAbsReal(f->z[i] - taken[i]) <= HYCO_RESIDUAL * most);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -12,7 +12,6 @@
 
 const char *const HycoReconstructSolvers[] = {"auto", "nnls", "tao", NULL};
 enum { SOLVER_AUTO, SOLVER_NNLS, SOLVER_TAO };
-#define RTOL 1e-8 /* of the optimality conditions of (41): the default of -hyco_solver_rtol */
 
 /* Explicit least squares: Lawson and Hanson's active set method, or TAO; with auto or tao the other one if the first
    does not converge. */
@@ -22,14 +21,14 @@ static PetscErrorCode ReconstructSolve(PetscInt solver, PetscInt m, PetscInt n, 
   PetscBool solved = PETSC_FALSE;
 
   PetscFunctionBegin;
-  if (solver == SOLVER_TAO) PetscCall(HycoTaoNNLS(m, n, A, b, HYCO_TAO_BNLS, RTOL, c, NULL, &solved));
-  /* TAO's own word is its recomputed optimality, to RTOL. */
+  if (solver == SOLVER_TAO) PetscCall(HycoTaoNNLS(m, n, A, b, HYCO_TAO_BNLS, HYCO_RESIDUAL, c, NULL, &solved));
+  /* TAO's own word is its recomputed optimality, to HYCO_RESIDUAL. */
   if (solved) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoNNLS(m, n, A, b, c, NULL));
   if (solver != SOLVER_AUTO) PetscFunctionReturn(PETSC_SUCCESS);
   /* By the optimality conditions of (41), not by the method's count of iterations. */
-  PetscCall(HycoNNLSCheck(m, n, A, b, c, RTOL, NULL, &solved));
-  if (!solved) PetscCall(HycoTaoNNLS(m, n, A, b, HYCO_TAO_BNLS, RTOL, c, NULL, &solved));
+  PetscCall(HycoNNLSCheck(m, n, A, b, c, HYCO_RESIDUAL, NULL, &solved));
+  if (!solved) PetscCall(HycoTaoNNLS(m, n, A, b, HYCO_TAO_BNLS, HYCO_RESIDUAL, c, NULL, &solved));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -193,7 +192,7 @@ PetscErrorCode HycoHybridReconstruct(HycoROM m)
   /* By the normal equations with changing weights: no matrix of all rows is formed. It may stop early, then the
      explicit problem decides. */
   if (h->reconstruct_solver != SOLVER_TAO && r->scale > 0)
-    PetscCall(HycoWeightedNNLS(r->weighted, r->d, r->h, RTOL, r->c, &solved));
+    PetscCall(HycoWeightedNNLS(r->weighted, r->d, r->h, HYCO_RESIDUAL, r->c, &solved));
   if (!solved) PetscCall(SolveWrittenOut(m, L));
   m->remainder = PetscMax(m->remainder, ReconstructRemainder(m, L, r, h->n_dual));
   for (PetscInt j = 0; j < h->n_dual; j++) {
