@@ -9,8 +9,6 @@
 #include <string.h>
 
 #define MOST_STEPS 200
-/* Of the length of a ray times that of a motion, their work: below it no ray resists; a tenth of HYCO_BALANCED. */
-#define RESISTS 1e-10
 
 PetscErrorCode HycoNormalsBalance(PetscInt p, PetscInt n, const PetscReal A[], const PetscReal f[], PetscReal rounding,
                                   PetscReal r[], PetscBool *exists)
@@ -88,7 +86,7 @@ static void BalanceRenew(const HycoBlocks *b, PetscInt p, const PetscReal A[], c
     PetscReal *ray = rays->ray + kept * HYCO_MAX_BLOCK, *column = rays->column + kept * p, work, length;
 
     BalanceBest(b, k, p, A, d, ray, &work, &length);
-    if (!(work > RESISTS * length * size)) continue;
+    if (!(work > HYCO_BALANCED * length * size)) continue;
     *against = PETSC_TRUE;
     for (PetscInt i = 0; i < p; i++) {
       column[i] = 0;

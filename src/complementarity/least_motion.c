@@ -7,8 +7,6 @@
 #include <hycolcp.h>
 #include <petscblaslapack.h>
 
-/* Of the largest force: 4500 eps, a solve with the set's factor; smaller forces hold nothing. */
-#define HELD 1e-12
 /* Weight of a motion itself beside that of slips, whose square is round-off of 1: it decides only what no slip of a
    closed contact does. */
 #define LAST_WEIGHT 1e-12
@@ -199,7 +197,7 @@ PetscErrorCode HycoBlocksLeastSlip(const HycoBlocks *b, PetscInt p, const PetscR
   PetscCall(PetscCalloc3(p, &scale, p * p, &N, b->n + 1, &closed));
   ScaleMotions(b, p, A, scale);
   for (PetscInt k = 0; k < b->n; k++) most = PetscMax(most, r[b->row[k]]);
-  for (PetscInt k = 0; k < b->n; k++) closed[k] = (PetscBool)(most > 0 && r[b->row[k]] > HELD * most);
+  for (PetscInt k = 0; k < b->n; k++) closed[k] = (PetscBool)(most > 0 && r[b->row[k]] > HYCO_FORCE_ROUND_OFF * most);
   PetscCall(FreeMotions(b, p, A, scale, closed, NULL, n, N));
   PetscCall(PetscArrayzero(x, p));
   PetscCall(PetscArraycpy(first, N, p));

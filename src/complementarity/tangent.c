@@ -21,8 +21,8 @@
 /* Of a motion's largest entry of all contacts, those of the set: less is the round-off of normals
    (tests/fom/gradients.py, bodies barely held). */
 #define FREE_ENTRY 1e-9
-/* Of the largest force: 45,000 eps, ten times HELD of least_motion.c; where closed contacts do not determine the
-   solution, a force above it closes its own (tests/fom/gradients.py, bodies barely held). */
+/* Of the largest force: 45,000 eps; where closed contacts do not determine the solution, a force above it closes its
+   own (tests/fom/gradients.py, bodies barely held). */
 #define SMALL_CLOSES 1e-11
 
 struct _n_HycoTangent {
