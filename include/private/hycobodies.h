@@ -439,8 +439,8 @@ PetscReal HycoBodiesMeasure(HycoROM model, HycoKKT *kkt);
 PetscReal HycoBodiesUnbalanced(HycoBodiesWork work);
 /* The same with all of the round-off, as HycoROM's `imbalance`; -1: supports prevent all motions. */
 PetscReal HycoBodiesImbalance(HycoBodiesWork work);
-PetscErrorCode HycoBodiesFreeMotion(HycoBodiesWork work, PetscInt n, const PetscReal Lambda[], PetscBool *loose);
-/* "body NAME in its place", of the bodies that contact alone holds. */
-void HycoBodiesNameFloating(HycoBodiesWork work, HycoScene scene, char name[HYCO_LINE]);
+/* Whether the contacts with a force leave a rigid motion free, and its name ("": none). */
+PetscErrorCode HycoBodiesFreeMotion(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal Lambda[],
+                                    PetscBool *loose, char name[HYCO_LINE]);
 
 #endif

@@ -83,9 +83,9 @@ static void ContactCheckWarn(Check *check, const HycoContactInspection *c)
     CheckReportWarning(
         check,
         "contact %s: the slave's facets (%s) are %.2g times as long as the master's (%s); with cells of "
-        "second order pressures then alternate from node to node: make the slave at most twice as fine, or "
-        "exchange slave and master",
-        c->name, c->slave, (double)c->coarse, c->master);
+        "second order pressures then alternate from node to node: make the slave at most twice as fine%s",
+        c->name, c->slave, (double)c->coarse, c->master,
+        c->stiff_max > 0 && c->stiff_max * STIFFER < 1 ? "" : ", or exchange slave and master");
   WarnOrder(check, c);
 }
 

@@ -1,10 +1,11 @@
 /*
-  Which facets around a slave count, on a surface that goes round an edge and that no map moves: those of which a part
-  looks at the master, whatever its distance. Beyond the master's border, or on another side of the body, a facet faces
-  nothing, and its area and normal are no part of a contact's.
+  Which facets around a slave count, on a surface that no map moves: those of which a part looks at the master, whatever
+  its distance. Beyond the master's border, or on another side of the body, a facet faces nothing, and its area and
+  normal are no part of a contact's.
 */
 #include "surface_normals.h"
 #include "master_search.h"
+#include <hycocarriers.h>
 #include <hycokinematics.h>
 
 /* Place on the line from a facet's middle to a node at which it is tested: near the node, but inside. */
@@ -18,7 +19,24 @@ typedef struct {
   HycoPairs *p;
   PetscInt *head, *next, *mask, *left; /* by node; by contact of the run: next, mask, left */
   PetscInt first;
+  PetscBool all; /* any facet may face nothing; else one with a node that has no master */
 } Masks;
+
+/* Whether a node of facet f that can have a contact has no master, while another has one. */
+static PetscBool IsLone(const Masks *s, HycoMesh m, PetscInt f)
+{
+  PetscInt met = 0, lone = 0;
+
+  for (PetscInt a = HycoMeshFirstCarrier(m); a < m->nf; a++) {
+    PetscBool master = PETSC_FALSE;
+
+    for (PetscInt k = s->head[m->facets[f * m->nf + a]]; k >= 0; k = s->next[k])
+      master = (PetscBool)(master || s->p->master_start[s->first + k + 1] > s->p->master_start[s->first + k]);
+    met += master;
+    lone += !master;
+  }
+  return (PetscBool)(met && lone);
+}
 
 /* Whether a point at x looks at the master: the search has it as one more slave. small: of the facet's size, below
    which a distance has no direction. */
@@ -103,7 +121,8 @@ static PetscErrorCode NoteFacets(HycoMasterSearch *t, Masks *s)
     for (PetscInt a = 0; a < m->nf && m->facet_group[f] == t->slave; a++)
       near = (PetscBool)(near || s->head[m->facets[f * m->nf + a]] >= 0);
     if (!near) continue;
-    PetscCall(FacetLooks(&one, f, X + 3 * n, outward + 3 * n, &looks));
+    looks = PETSC_TRUE;
+    if (s->all || IsLone(s, m, f)) PetscCall(FacetLooks(&one, f, X + 3 * n, outward + 3 * n, &looks));
     NoteFacet(s, m, f, looks);
   }
   PetscCall(PetscFree2(X, outward));
@@ -132,14 +151,15 @@ PetscErrorCode HycoPairsMask(HycoFE fe, PetscInt index, PetscInt first, HycoPair
   const HycoContact c = fe->scene->contact[index];
   const PetscInt n = p->n - first;
   HycoMasterSearch t;
+  const HycoMesh m = fe->mesh;
   Masks s = {.p = p, .first = first};
-  PetscInt edges;
+  PetscInt edges, g = 0;
+  PetscBool any;
 
   PetscFunctionBegin;
   PetscCall(HycoPairsEdges(fe, p, index, &edges));
-  if (fe->dim == 1 || !n || !(edges & HYCO_SLAVE_EDGE) || !c->master || c->rigid || HycoPairsFollows(p, index))
-    PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoMasterSearchCreate(fe, c, PETSC_FALSE, edges, &t));
+  if (fe->dim == 1 || !n || !c->master || c->rigid || HycoPairsFollows(p, index)) PetscFunctionReturn(PETSC_SUCCESS);
+  any = s.all = (PetscBool)(edges & HYCO_SLAVE_EDGE);
   PetscCall(PetscMalloc1(fe->mesh->n_nodes, &s.head));
   PetscCall(PetscMalloc1(n, &s.next));
   PetscCall(PetscCalloc1(n, &s.mask));
@@ -149,6 +169,10 @@ PetscErrorCode HycoPairsMask(HycoFE fe, PetscInt index, PetscInt first, HycoPair
     s.next[k] = s.head[p->slave[first + k]];
     s.head[p->slave[first + k]] = k;
   }
+  PetscCall(HycoMeshFindGroup(m, "contact", c->slave, &g));
+  for (PetscInt f = 0; f < m->n_facets && !any; f++) any = (PetscBool)(m->facet_group[f] == g && IsLone(&s, m, f));
+  PetscCall(PetscMemzero(&t, sizeof(t)));
+  if (any) PetscCall(HycoMasterSearchCreate(fe, c, PETSC_FALSE, edges, &t));
   HycoFinally(MasksRun(&t, p->n, &s), HycoFreeAll(&s.head, &s.next, &s.mask, &s.left);
               PetscCall(HycoMasterSearchDestroy(&t)));
   PetscFunctionReturn(PETSC_SUCCESS);

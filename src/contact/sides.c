@@ -122,20 +122,17 @@ static int CompareCorners(const void *a, const void *b)
   return (p->place > q->place) - (p->place < q->place);
 }
 
-/* The ranks at the nodes of groups that have an edge. */
+/* The ranks at the nodes of each group. */
 static PetscErrorCode RankFacets(Star *s, const Corner corner[])
 {
   HycoMesh m = s->m;
   const PetscInt n = m->n_facets * m->nf;
-  PetscBool *edge;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(m->n_groups, &edge));
-  for (PetscInt k = 0; k < n; k++) edge[m->facet_group[k / m->nf]] |= s->side[k] >= 0;
   for (PetscInt k = 0; k < n; k++) {
     const Corner *of = &corner[k];
 
-    for (PetscInt way = -1; way <= 1 && edge[of->group]; way += 2) {
+    for (PetscInt way = -1; way <= 1; way += 2) {
       for (PetscInt j = k + way; j >= 0 && j < n && corner[j].group == of->group && corner[j].node == of->node;
            j += way) {
         PetscBool before;
@@ -145,7 +142,6 @@ static PetscErrorCode RankFacets(Star *s, const Corner corner[])
       }
     }
   }
-  PetscCall(PetscFree(edge));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -179,7 +179,7 @@ static void SupportsName(HycoFE fe, const HycoRigid *r, const char others[], cha
   const PetscReal *w = fe->dim == 3 ? r->rigid + 3 : NULL;
   PetscReal t[3] = {0, 0, 0}, omega[3] = {0, 0, fe->dim == 2 ? r->rigid[2] : 0}, at[3], move = 0, turn = 0, size = 0,
             d[3];
-  PetscReal first;
+  PetscReal first, along = 0;
 
   for (PetscInt c = 0; c < 3; c++) {
     if (c < fe->dim) t[c] = r->rigid[c];
@@ -187,7 +187,8 @@ static void SupportsName(HycoFE fe, const HycoRigid *r, const char others[], cha
     move += t[c] * t[c];
     turn += omega[c] * omega[c];
   }
-  /* The point of the axis nearest to the centre is omega x t / |omega|^2. */
+  /* The point of the axis nearest to the centre is omega x t / |omega|^2. Named is that nearest to the origin, on which
+     full order and models agree, whose motions have other centres. */
   for (PetscInt c = 0; c < 3; c++) {
     const PetscInt e = (c + 1) % 3, f = (c + 2) % 3;
 
@@ -195,6 +196,10 @@ static void SupportsName(HycoFE fe, const HycoRigid *r, const char others[], cha
     size += d[c] * d[c];
     /* x = centre + size times the point: motions are relative to both. */
     at[c] = turn > 0 ? r->centre[c] + r->size * (omega[e] * t[f] - omega[f] * t[e]) / turn : 0;
+    along += at[c] * omega[c];
+  }
+  for (PetscInt c = 0; c < 3; c++) {
+    if (turn > 0) at[c] -= along * omega[c] / turn;
     if (PetscAbsReal(at[c]) < 1e-6 * r->size) at[c] = 0; /* round-off */
   }
   for (PetscInt c = 0; c < 3; c++) {

@@ -373,6 +373,20 @@ static PetscErrorCode MeasureSliding(HycoFOM f, PetscReal *sliding)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without friction; with it, friction.c does this after each step. */
+static PetscErrorCode NameFreeMotion(HycoFOM f, HycoPath p)
+{
+  char name[HYCO_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMNameFreeMotion(f, name));
+  if (!name[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!p->loose[0]) p->loose_at[0] = p->t;
+  if (!p->loose[0]) PetscCall(PetscStrncpy(p->loose, name, sizeof(p->loose)));
+  p->loose_at[1] = p->t;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Records a listed time. Energies are those since the start. */
 static PetscErrorCode FOMPathRecord(HycoPath p)
 {
@@ -394,6 +408,7 @@ static PetscErrorCode FOMPathRecord(HycoPath p)
   f->sigma_ready = f->all_ready = PETSC_FALSE;
   PetscCall(MeasureSliding(f, &s->sliding));
   if (f->n_contacts) PetscCall(HycoFOMCountDependent(f, &s->n_dependent));
+  if (!f->friction && s->total_contact_force > 0) PetscCall(NameFreeMotion(f, p));
   PetscCall(HycoFOMMeasureQuantities(f, s->quantity));
   /* HycoPathSetUp() has room for all listed times and one more, the end of an incomplete path. */
   p->steps[p->n_steps++] = *s;

@@ -8,7 +8,7 @@ import numpy as np
 from common import SOURCE, Case
 
 sys.path.insert(0, os.path.join(SOURCE, 'tests', 'verify'))
-from grids import Grid  # noqa: E402
+from grids import Grid, second  # noqa: E402
 
 COLUMNS = """
 scene: {mesh: mesh.msh%s}
@@ -50,6 +50,28 @@ class Edges(Case):
                 self.solved(found)
                 self.assertEqual(found['n_contacts'], (n + 1)**(dim - 1))
                 for name, value in {'along': 0, 'peak': 1, 'touch': 1, 'low': -1, 'high': -1}.items():
+                    self.assertAlmostEqual(found['outputs'][name], value, delta=1e-9, msg=name)
+
+    def test_overhang(self):
+        """A slave twice as wide as its master, plain or with the rest of its body: a block of Poisson's ratio 0 under a uniform pressure has a uniform contact pressure, on an area of its own; also with cells of second order, in 3D, of a pair, on ranks."""
+        for kind, type_, skin, ranks in (('quad4', 'surface', False, 0), ('quad4', 'surface', True, 0), ('quad4', 'mortar', False, 2), ('quad8', 'mortar', False, 0), ('quad8', 'mortar', True, 3), ('hex8', 'surface', False, 2), ('tet4', 'mortar', False, 0), ('quad4', 'pair', True, 0)):
+            dim, grid = 3 if kind in ('hex8', 'tet4') else 2, Grid()
+            half = 2 if dim == 3 else 3
+            for body, cells, y in (('base', 2 * half, -1), ('block', half, 0)):
+                axis, wide = np.linspace(0, 1, half + 1), np.linspace(0, cells / half, cells + 1)
+                start = len(grid.elements)
+                grid.box({'quad8': 'quad4'}.get(kind, kind), [wide, axis, *[axis] * (dim - 2)], lambda x, y=y: x + np.eye(dim)[1] * y, body, {f'{a}{e}': f'{body}_{a}{e}' for a in 'xyz'[:dim] for e in '01'})
+                if body == 'base':
+                    tags = {grid._tag(f'base_{a}{e}', dim - 1) for a in 'xyz'[:dim] for e in '01' if skin or f'{a}{e}' == 'y1'}
+                    grid.elements += [(t, grid._tag('slave', dim - 1), e) for t, tag, e in grid.elements[start:] if tag in tags]
+            mesh = grid if kind != 'quad8' else second(grid, kind)
+            text = ('scene: {mesh: mesh.msh}\nbody: {base: {young: 1000}, block: {young: 700}}\nfixed: {base: {%s}, block_x0: {x: 0}%s}\npressure: {block_y1: 1}\n'
+                    'contact: {c: {type: %s, slave: slave, master: block_y0, tolerance: 0.05}}\n'
+                    'output: {peak: {max: contact_pressure, contact: c}, touch: {area: closed, contact: c}, f: {force: y, contact: c}, low: {min: sigma_yy, group: block}}\n'
+                    % (', '.join(f'{a}: 0' for a in 'xyz'[:dim]), ', block_z0: {z: 0}' if dim == 3 else '', type_))
+            with self.subTest(kind=kind, type=type_, skin=skin, ranks=ranks):
+                found = self.hyco('solve', '-scene', self.written(text, mesh), ranks=ranks)
+                for name, value in {'peak': 1, 'touch': 1, 'f': -1, 'low': -1}.items():  # the force over the area is the largest pressure
                     self.assertAlmostEqual(found['outputs'][name], value, delta=1e-9, msg=name)
 
     def test_normal(self):

@@ -245,6 +245,30 @@ class Friction(Case):
         self.assertEqual([len(line) for line in lines], [1, 1, 1])
         self.assertEqual(lines[0], lines[1])
 
+    def test_arbitrary_without_friction(self):
+        """The same without friction, on a path and without one; on a ring, which a turn about its axis leaves in contact, an axis through one point."""
+        grid = Grid()
+        grid.box('quad4', [np.linspace(0, 1, 2)] * 2, lambda x: x, 'block', {'y0': 'base', 'y1': 'top', 'x0': 'left', 'x1': 'right'})
+        for times in ('[0, 1, 2]', ''):
+            text = WIDENS.replace('p*t', 'p*(1 + t)').replace(', friction: 0.1}', '}, l: {group: left, gap: 0.5}, r: {group: right, gap: 0.5}')
+            self.written(text if times else text.replace('*(1 + t)', '').replace('history: {times: [0, 1, 2]}\n', ''), grid)
+            name = 'body block from moving along (1, 0, 0)' + (' (t = 0 to 2)' if times else '')
+            self.assertEqual(self.hyco('solve', '-scene', 'scene.yaml', '-mu', '7')['loose'], name)
+        self.hyco('train', '-scene', 'scene.yaml', '-grid', '3', '-model', 'free.h5', '-hyco_model_type', 'bodies')
+        self.assertEqual(self.hyco('predict', '-model', 'free.h5', '-mu', '7')['loose'], name)
+        grid = Grid()  # a half disk on a floor of blocks tilted about its middle: it may turn about (1, 0, 2)
+        bent = lambda x: np.stack([1 + 0.5 * x[:, 0] * np.cos(np.pi * x[:, 1]), 0.5 * x[:, 0] * np.sin(np.pi * x[:, 1])], -1)
+        grid.box('quad4', [np.linspace(1, 2, 3), np.linspace(0.2, 0.8, 7)], bent, 'arc', {'x1': 'out', 'x0': 'in', 'y0': 'right', 'y1': 'left'})
+        self.written('scene: {mesh: mesh.msh, parameters: [p]}\nparameter: {p: {range: [5, 10]}}\nbody: {arc: {young: 1000}}\npressure: {in: p}\n'
+                     'contact: {round: {type: obstacle, group: out, normal: {x: x - 1, y: y}, gap: 0}, r: {group: right, gap: 0.1}, l: {group: left, gap: 0.1}}\n', grid)
+        found = []
+        for args in (('solve', '-scene', 'scene.yaml'), ('predict', '-model', 'arc.h5')):
+            if args[0] == 'predict':
+                self.hyco('train', '-scene', 'scene.yaml', '-grid', '3', '-model', 'arc.h5', '-hyco_model_type', 'bodies')
+            found.append(self.hyco(*args, '-mu', '7')['loose'])
+        self.assertIn('body arc from turning about (0, 0, 1) through (1, 0, 0)', found[0])
+        self.assertEqual(*found)
+
     def test_unloaded(self):
         """The block that friction holds, with its load taken away and applied again: no forces at the time without a load. So a block that a lid
         has drawn along and leaves: it stays there, and a line says that nothing holds it. A block

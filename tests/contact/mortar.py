@@ -1,10 +1,16 @@
 """Contacts of type mortar on moved surfaces: ranks, models, messages. What they are for, pressures: tests/verify/mortar.py."""
+import os
+import sys
 import unittest
 
 import h5py
+import numpy as np
 
 import roller
-from common import Case, msh
+from common import SOURCE, Case, msh
+
+sys.path.append(os.path.join(SOURCE, 'tests', 'verify'))
+from grids import Grid, second  # noqa: E402
 
 RANGES = {'lo': -4, 'hi': 4}
 POINTS = ('1.3,0.5,20', '-3.7,1.5,60')
@@ -131,6 +137,19 @@ contact: {c: {type: mortar, slave: under, master: upper}}
         with open(scene, 'w', encoding='ascii') as f:
             f.write(text.replace('slave: round', 'slave: upper').replace('master: upper', 'master: base'))
         self.refused('solve', '-scene', scene, '-mu', POINTS[0], texts=('upper', 'base'))
+
+    def test_fine_slave(self):
+        """A slave of second order more than twice as fine as the master is warned of, and not one exactly twice as fine, nor one of first order; to exchange the two is advised unless it makes the stiffer side the slave."""
+        for kind, slave, young, warned, exchange in (('quad8', 4, 100, False, False), ('quad8', 5, 100, True, True), ('tri6', 5, 100, True, True), ('quad4', 5, 100, False, False), ('quad8', 5, 50, True, False)):
+            grid = Grid()
+            for body, n, y in (('low', 2, -1), ('up', slave, 0)):
+                grid.box({'quad8': 'quad4', 'tri6': 'tri3'}.get(kind, kind), [np.linspace(0, 1, n + 1), np.linspace(0, 1, 3)], lambda x, y=y: x + (0, y), body, {'y0': f'{body}_low', 'y1': f'{body}_high'})
+            mesh = grid if kind == 'quad4' else second(grid, kind)
+            scene = self.written('scene: {mesh: mesh.msh}\nbody: {low: {young: 100}, up: {young: %g}}\nfixed: {low_low: {x: 0, y: 0}, up_high: {x: 0}}\npressure: {up_high: 1}\n'
+                                 'contact: {c: {type: mortar, slave: up_low, master: low_high}}\n' % young, mesh)
+            lines = [line for line in self.hyco('check', '-scene', scene)['warnings'] if 'up_low' in line]
+            with self.subTest(kind=kind, slave=slave, young=young):
+                self.assertEqual((len(lines), any('low_high' in line for line in lines), any('exchange' in line for line in lines)), (int(warned), warned, exchange), lines)
 
 
 if __name__ == '__main__':

@@ -161,8 +161,7 @@ static PetscErrorCode BodiesSolve(HycoROM m, const PetscReal mu[])
   m->imbalance = HycoBodiesImbalance(o);
   /* The bound of theory.md: from the samples' error e and the present forces; 0 where nothing is interpolated. */
   p->interpolation_error = HycoBodiesBound(o, &norm);
-  PetscCall(HycoBodiesFreeMotion(o, m->model->pairs.n, m->Lambda, &p->loose));
-  if (p->loose) HycoBodiesNameFloating(o, m->model->scene, m->loose);
+  PetscCall(HycoBodiesFreeMotion(o, &s, m->Lambda, &p->loose, m->loose));
   p->iterations = o->its;
   p->reason = solved && residual > m->solver->rtol ? HYCO_DIVERGED_RESIDUAL : o->reason;
   /* As at full order: a method that ends without an answer of its own may have found it, but not beside the

@@ -371,6 +371,7 @@ PetscErrorCode HycoBodiesNameMotion(HycoBodiesWork o, const HycoBodiesSurface *s
   HycoBodiesDisplacementsOfForces(o, s, L);
   HycoBodiesMove(o, s, U);
   PetscCall(PetscArraycpy(o->x, x, p));
+  HycoBodiesDisplacementsOfForces(o, s, L);
   for (PetscInt i = 0; i < fe->n_dof; i++) U[i] -= rest[i];
   for (PetscInt b = 0; b < o->bodies->n; b++) {
     PetscCall(FitRigid(fe, o, b, U, &r, &share));

@@ -241,11 +241,13 @@ static PetscErrorCode BodiesPathRecord(HycoPath p)
   else if (p->now.total_contact_force > 0 || HycoBodiesLoaded(&w->bodies)) {
     char name[HYCO_LINE];
 
-    PetscCall(HycoBodiesFreeMotion(&w->bodies, w->surface.n, m->Lambda, loose));
-    if (*loose && !m->prediction.loose) p->loose_at[0] = p->t;
-    p->loose_at[1] = p->t;
-    HycoBodiesNameFloating(&w->bodies, m->model->scene, name);
-    if (*loose) HycoPathNameTimes(name, p->loose_at, m->loose);
+    PetscCall(HycoBodiesFreeMotion(&w->bodies, &w->surface, m->Lambda, loose, name));
+    if (*loose && !m->prediction.loose) {
+      PetscCall(PetscStrncpy(p->loose, name, sizeof(p->loose)));
+      p->loose_at[0] = p->t;
+    }
+    if (*loose) p->loose_at[1] = p->t;
+    if (*loose) HycoPathNameTimes(p->loose, p->loose_at, m->loose);
   }
   m->prediction.loose = (PetscBool)(m->prediction.loose || *loose);
   PetscCall(HycoRowsCountDependent(rows, m->fe->n_dof, m->U, m->Lambda,

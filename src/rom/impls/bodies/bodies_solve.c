@@ -1139,46 +1139,38 @@ void HycoBodiesMotionRow(HycoBodiesWork o, PetscInt k, PetscReal g[])
     HycoBodiesAdd(p, o->row[e], o->Z + o->row_at[e] * p, g);
 }
 
-/* Whether the contacts with a force leave a rigid motion free. By Cholesky's pivots of G^T G over them, G = B Z,
-   relative to the motions' squared lengths over all contacts. */
-PetscErrorCode HycoBodiesFreeMotion(HycoBodiesWork o, PetscInt n, const PetscReal Lambda[], PetscBool *loose)
+/* Whether the contacts with a force leave a rigid motion free, which is named. By the least eigenvalue of G^T G over
+   them, G = B Z, relative to the motions' squared lengths over all contacts. */
+PetscErrorCode HycoBodiesFreeMotion(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal Lambda[],
+                                    PetscBool *loose, char name[HYCO_LINE])
 {
   const PetscInt p = o->bodies->p;
-  PetscReal *gram, *all, *g, least = 0;
-  PetscBool held;
+  PetscReal *gram, *all, *g, *value, *work, least = 0;
+  PetscBLASInt n, lwork, info;
 
   PetscFunctionBegin;
   *loose = PETSC_FALSE;
+  name[0] = '\0';
   if (!p) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscCalloc3(p * p, &gram, p, &all, p, &g));
-  for (PetscInt k = 0; k < n; k++) least = PetscMax(least, HYCO_FORCE_ROUND_OFF * Lambda[k]);
-  for (PetscInt k = 0; k < n; k++) {
+  PetscCall(PetscBLASIntCast(p, &n));
+  lwork = 8 * n;
+  PetscCall(PetscCalloc5(p * p, &gram, p, &all, p, &g, p, &value, 8 * p, &work));
+  for (PetscInt k = 0; k < s->n; k++) least = PetscMax(least, HYCO_FORCE_ROUND_OFF * Lambda[k]);
+  for (PetscInt k = 0; k < s->n; k++) {
     HycoBodiesMotionRow(o, k, g);
     for (PetscInt i = 0; i < p; i++) all[i] += g[i] * g[i];
     for (PetscInt i = 0; i < p * p && Lambda[k] > least; i++) gram[i] += g[i / p] * g[i % p];
   }
-  PetscCall(HycoCholesky("U", p, gram, all, &held));
-  *loose = (PetscBool)!held;
-  PetscCall(PetscFree3(gram, all, g));
+  for (PetscInt i = 0; i < p; i++) all[i] = all[i] > 0 ? 1 / PetscSqrtReal(all[i]) : 1;
+  for (PetscInt i = 0; i < p * p; i++) gram[i] *= all[i / p] * all[i % p];
+  LAPACKsyev_("V", "U", &n, gram, &n, value, work, &lwork, &info);
+  PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev: %d", (int)info);
+  /* Squares: a share of 1e-7 of the motion, as at full order. */
+  *loose = (PetscBool)(value[0] <= HYCO_FREE_MOTION);
+  for (PetscInt i = 0; i < p; i++) g[i] = gram[i] * all[i];
+  if (*loose) PetscCall(HycoBodiesNameMotion(o, s, Lambda, g, name));
+  PetscCall(PetscFree5(gram, all, g, value, work));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Which of several it is, is not asked: of bodies that hold each other none has a place. */
-void HycoBodiesNameFloating(HycoBodiesWork o, HycoScene scene, char name[HYCO_LINE])
-{
-  const HycoSubstructures b = o->bodies;
-  char list[HYCO_LINE] = "", before[HYCO_LINE];
-  PetscInt n = 0;
-
-  for (PetscInt k = 0; k < b->n; k++) {
-    PetscBool moves = PETSC_FALSE;
-
-    for (PetscInt i = b->start[k] * b->p; i < b->start[k + 1] * b->p; i++) moves = (PetscBool)(moves || o->Z[i] != 0);
-    if (!moves) continue;
-    HycoFormat(before, "%s", list);
-    HycoFormat(list, "%s%s%s", before, n++ ? ", " : "", scene->body[k].name);
-  }
-  HycoFormat(name, "%s%s in its place", n > 1 ? "one of the bodies " : "body ", list);
 }
 
 /* By nonnegative least squares, as at full order: the rest is a motion that closes no contact. */
