@@ -68,8 +68,10 @@ typedef struct {
   PetscBool inconsistent;
   /* What the loads and contact forces on a body, with all that its supports can carry, miss of the balance of forces
      and moments: along each motion that the supports leave free, relative to the sum of the magnitudes there, the
-     largest, of a path of all listed times; < 0: not compared, as supports carry whatever is left. unbalanced: it is
-     larger than the estimated error of the contact forces. */
+     largest, of a path of all listed times. Without a history also with the reactions among the outputs that are
+     measured from displacements, of groups with all supports of their bodies along the axis, relative to the magnitudes
+     of all forces; < 0: not compared. unbalanced: it is larger than the estimated error of the contact forces and of
+     the reaction. */
   PetscReal balance;
   PetscBool unbalanced;
   /* How much larger than at all held-out points an indicator of the errors is, at least 1, and its index in

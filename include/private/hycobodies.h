@@ -436,9 +436,9 @@ void HycoBodiesMotionRow(HycoBodiesWork work, PetscInt k, PetscReal g[]);
 /* The residuals at the contacts, recomputed from U and the forces; `stationarity` is that of floating bodies. Returns
    the largest without the effect of rounding the terms whose sum the displacements are, which judges the solve. */
 PetscReal HycoBodiesMeasure(HycoROM model, HycoKKT *kkt);
-PetscReal HycoBodiesUnbalanced(HycoBodiesWork work);
-/* The same with all of the round-off, as HycoROM's `imbalance`; -1: supports prevent all motions. */
-PetscReal HycoBodiesImbalance(HycoBodiesWork work);
+/* Of the motions that contact alone prevents, HycoROMImbalance(); -1 (beyond: 0): there are none. beyond: without
+   round-off, to judge a solve. */
+PetscReal HycoBodiesImbalance(HycoBodiesWork work, PetscBool beyond);
 /* Whether the contacts with a force leave a rigid motion free, and its name ("": none). */
 PetscErrorCode HycoBodiesFreeMotion(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal Lambda[],
                                     PetscBool *loose, char name[HYCO_LINE]);

@@ -372,6 +372,11 @@ PetscErrorCode HycoFloatingCreate(PetscInt n, const HycoRigid rigid[], PetscInt 
 PetscErrorCode HycoFloatingMove(HycoH5 file, HycoROM model);
 PetscErrorCode HycoFloatingBalance(HycoROM model);
 PetscErrorCode HycoFloatingDestroy(HycoFloating *floating);
+/* What n forces (force[at[k]]; at NULL: force[k]) miss of the balance with the loads along p motions, relative to the
+   magnitudes of all terms of a motion, the largest: work[n x p] per force, load[p], size[p] of the loads' terms.
+   rounding: work per reach of a motion that is not counted. */
+PetscReal HycoROMImbalance(PetscInt p, PetscInt n, const PetscReal work[], const PetscInt at[], const PetscReal force[],
+                           const PetscReal load[], const PetscReal size[], PetscReal rounding);
 /* Writes a mesh below prefix/, or reads it and creates *mesh. */
 PetscErrorCode HycoMeshMove(HycoH5 file, const char prefix[], PetscInt n_bodies, HycoMesh *mesh);
 
@@ -391,6 +396,12 @@ PetscBool HycoROMFollowsFromBalance(HycoROM model, PetscInt q);
 /* Sets the quantities that follow from forces Lambda of a prediction and the loads at mu[]. NULL-safe. */
 PetscErrorCode HycoResultantsSet(HycoROM model, HycoResultants resultants, const PetscReal mu[],
                                  const PetscReal Lambda[], PetscReal value[]);
+/* What a reaction that does not follow, of this value, misses of the balance with the loads and contact forces of the
+   last prediction, and the sum of the magnitudes of the forces; 0, 0: not known, as its group has not all supports of
+   its bodies along the axis. NULL-safe. */
+PetscErrorCode HycoResultantsMiss(HycoROM model, HycoResultants resultants, PetscInt q, PetscReal value,
+                                  PetscReal *miss, PetscReal *size);
+PetscErrorCode HycoROMGetMiss(HycoROM model, PetscInt q, PetscReal value, PetscReal *miss, PetscReal *size);
 PetscErrorCode HycoResultantsDestroy(HycoResultants *resultants);
 /* NULL-safe. */
 PetscErrorCode HycoCarriedDestroy(HycoCarried *carried);

@@ -446,6 +446,27 @@ static PetscErrorCode EvaluateFeatures(HycoROM m, const PetscReal nearest[], Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Forces that had to be changed so much to balance, or do not balance, are wrong by about that. Reactions that are
+   measured may also miss the balance by their own error. */
+static PetscErrorCode EstimateBalance(HycoROM m, HycoPrediction *p)
+{
+  const PetscReal limit = PetscMax(HYCO_RESIDUAL, p->estimated_error_lambda < 0 ? UNJUDGED : p->estimated_error_lambda);
+
+  PetscFunctionBegin;
+  p->unbalanced = (PetscBool)(p->balance > limit);
+  for (PetscInt q = 0; q < m->model->scene->n_quantities && !m->model->scene->n_times; q++) {
+    PetscReal miss, size;
+
+    PetscCall(HycoROMGetMiss(m, q, p->quantity[q], &miss, &size));
+    if (!(size > 0)) continue;
+    p->balance = PetscMax(p->balance, miss / size);
+    p->unbalanced = (PetscBool)(p->unbalanced || miss > limit * size + PetscMax(p->estimated_error_quantity[q], 0));
+  }
+  if (p->estimated_error_lambda >= 0)
+    p->estimated_error_lambda = PetscMax(p->estimated_error_lambda, PetscMax(m->corrected, m->imbalance));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* First everything is set to "not known", so that every early end leaves a valid prediction. */
 PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
 {
@@ -467,12 +488,7 @@ PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
   /* Features of forces outside the RID need the reconstruction. */
   if (p->reason <= 0 || (m->ops->reconstruct && !m->reconstruct)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(EvaluateFeatures(m, nearest, p));
-  /* Forces that had to be changed so much to balance, or do not balance, are wrong by about that. */
-  p->unbalanced =
-      (PetscBool)(p->balance >
-                  PetscMax(HYCO_RESIDUAL, p->estimated_error_lambda < 0 ? UNJUDGED : p->estimated_error_lambda));
-  if (p->estimated_error_lambda >= 0)
-    p->estimated_error_lambda = PetscMax(p->estimated_error_lambda, PetscMax(m->corrected, m->imbalance));
+  PetscCall(EstimateBalance(m, p));
   /* Full order may find other nodal forces, as far away as they are. */
   if (p->n_dependent > 0) p->estimated_error_lambda = -1;
   PetscFunctionReturn(PETSC_SUCCESS);

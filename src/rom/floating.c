@@ -300,24 +300,25 @@ static PetscErrorCode ROMFloatingMinimise(const Dual *d, PetscReal c[], PetscBoo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the forces' works miss of the loads' (size: of their terms), relative to the terms of each motion. Without a
-   load terms may be round-off of the forces, where none acts along the motion. */
-static PetscReal ROMFloatingImbalance(const Dual *d, const PetscReal size[])
+/* Without a load, terms may be round-off of the forces, where none acts along the motion: it has no balance to miss. */
+PetscReal HycoROMImbalance(PetscInt p, PetscInt n, const PetscReal work[], const PetscInt at[], const PetscReal force[],
+                           const PetscReal load[], const PetscReal size[], PetscReal rounding)
 {
-  PetscReal most = 0, reach = 0, all = 0;
+  PetscReal most = 0, all = 0;
 
-  for (PetscInt i = 0; i < d->n * d->p; i++) reach = PetscMax(reach, PetscAbsReal(d->work[i]));
-  for (PetscInt k = 0; k < d->n; k++) all += PetscAbsReal(d->force[d->contact[k]]);
-  for (PetscInt j = 0; j < d->p; j++) {
-    PetscReal sum = -d->load[j], terms = size[j];
+  for (PetscInt k = 0; k < n; k++) all += PetscAbsReal(force[at ? at[k] : k]);
+  for (PetscInt j = 0; j < p; j++) {
+    PetscReal sum = -load[j], terms = size[j], reach = 0;
 
-    for (PetscInt k = 0; k < d->n; k++) {
-      const PetscReal work = d->force[d->contact[k]] * d->work[k * d->p + j];
+    for (PetscInt k = 0; k < n; k++) {
+      const PetscReal term = force[at ? at[k] : k] * work[k * p + j];
 
-      sum += work;
-      terms += PetscAbsReal(work);
+      sum += term;
+      terms += PetscAbsReal(term);
+      reach = PetscMax(reach, PetscAbsReal(work[k * p + j]));
     }
-    if (terms > HYCO_NOTHING * reach * all) most = PetscMax(most, PetscAbsReal(sum) / terms);
+    sum = PetscMax(PetscAbsReal(sum) - rounding * reach, 0);
+    if (terms > HYCO_LOADS_ROUND_OFF * reach * all) most = PetscMax(most, sum / terms);
   }
   return most;
 }
@@ -341,7 +342,8 @@ PetscErrorCode HycoFloatingBalance(HycoROM m)
   d.load = load;
   PetscCall(LoadWork(m, f, m->fe->mu, load, size, &found));
   if (found) PetscCall(FillDual(m, fe, &d));
-  if (found) m->corrected = PetscMax(m->corrected, ROMFloatingImbalance(&d, size));
+  if (found)
+    m->corrected = PetscMax(m->corrected, HycoROMImbalance(f->n, d.n, d.work, d.contact, m->Lambda, load, size, 0));
   if (d.n) PetscCall(ROMFloatingMinimise(&d, c, &met));
   /* Only if all works agree: forces in between would be neither the model's nor in balance. */
   for (PetscInt k = 0; met && k < d.n; k++) {
@@ -350,7 +352,8 @@ PetscErrorCode HycoFloatingBalance(HycoROM m)
     for (PetscInt j = 0; j < d.p; j++) power += c[j] * d.work[k * d.p + j];
     m->Lambda[d.contact[k]] *= PetscExpReal(power);
   }
-  if (found) m->imbalance = PetscMax(m->imbalance, ROMFloatingImbalance(&d, size));
+  if (found)
+    m->imbalance = PetscMax(m->imbalance, HycoROMImbalance(f->n, d.n, d.work, d.contact, m->Lambda, load, size, 0));
   PetscCall(PetscFree5(load, size, c, d.contact, d.work));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

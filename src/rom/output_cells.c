@@ -889,6 +889,11 @@ const PetscBool *HycoROMGetPushed(HycoROM m, PetscInt q)
   return m->output_cells ? HycoResultantsPushed(m, m->output_cells->resultants, q) : NULL;
 }
 
+PetscErrorCode HycoROMGetMiss(HycoROM m, PetscInt q, PetscReal value, PetscReal *miss, PetscReal *size)
+{
+  return HycoResultantsMiss(m, m->output_cells ? m->output_cells->resultants : NULL, q, value, miss, size);
+}
+
 PetscBool HycoROMFollowsFromBalance(HycoROM m, PetscInt q)
 {
   return (PetscBool)(m->output_cells && HycoResultantsFollow(m, m->output_cells->resultants, q));

@@ -239,3 +239,31 @@ PetscErrorCode HycoResultantsSet(HycoROM m, HycoResultants r, const PetscReal mu
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+/* Of reactions that are measured: those that follow balance whatever the forces are. Magnitudes are of all axes, as a
+   resultant may vanish by symmetry. */
+PetscErrorCode HycoResultantsMiss(HycoROM m, HycoResultants r, PetscInt q, PetscReal value, PetscReal *miss,
+                                  PetscReal *size)
+{
+  const PetscInt axis = m->model->scene->quantity[q].field;
+  const PetscBool *of = r ? r->balanced + q * m->model->scene->n_bodies : NULL;
+  PetscReal push, load;
+  PetscBool any = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  *miss = *size = 0;
+  if (!r || m->model->scene->quantity[q].kind != HYCO_QUANTITY_REACTION || ResultantsBodies(m, r, q) ||
+      !HycoROMHasAllForces(m))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt b = 0; b < m->model->scene->n_bodies; b++) any = (PetscBool)(any || of[b]);
+  if (!any) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(BringLoads(r, m->fe->mu));
+  PetscCall(HycoROMPushBodies(m, m->Lambda, of, axis, &push));
+  load = ResultantsLoad(r, of, axis);
+  *miss = PetscAbsReal(value + push + load);
+  *size = PetscAbsReal(value);
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) *size += PetscAbsReal(m->Lambda[k]);
+  for (PetscInt i = 0; i < r->fe->n_dof; i++)
+    *size += of[r->mesh->node_body[i / r->fe->dim]] ? PetscAbsReal(r->load[i]) : 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -144,6 +144,7 @@ class Entries(Case):
         run(solve, '-options_view', word='-mu 0.07,0.17')
         run(solve, '-options_left', word='no unused options')
         run(solve, '-citations', word='petsc')
+        run(solve, '-fp_trap')
         run(solve, '-prefix_push', 'hyco_solver_', '-max_its', '50', '-prefix_push', 'warm_', '-start', '0', '-prefix_pop', '-prefix_pop')
         run(solve, '-prefix_push', 'hyco_solver_', '-maxits', '5', '-prefix_pop', status=1, word='-hyco_solver_max_its', written=False)
         run(solve, PETSC_OPTIONS='-ksp_monitor -hyco_pod_svd_view')

@@ -142,7 +142,8 @@ class Ties(Case):
                     self.assertLess(report['error_u']['max'], bound)
                     self.assertLess(report['error_u_h1']['max'], 5 * bound)
                 self.assertLess(abs(found[1]['error_u']['max'] - found[0]['error_u']['max']), 1e-4 * found[0]['error_u']['max'] + 1e-12)
-                model = self.hyco('predict', '-model', 'm.h5', '-mu', '0.27,310', '-output', 'model.xdmf')
+                # reactions of the projection-based model do not balance its contact forces
+                model = self.hyco('predict', '-model', 'm.h5', '-mu', '0.27,310', '-output', 'model.xdmf', status=3 * (kind == 'projection'))
                 for name, value in full[0]['outputs'].items():
                     self.near(model['outputs'][name], value, 10 * bound, name)
                 with h5py.File(self.path('model.h5')) as f:

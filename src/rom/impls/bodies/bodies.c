@@ -68,7 +68,7 @@ PetscReal HycoBodiesMeasure(HycoROM m, HycoKKT *kkt)
   const HycoBodiesWork o = (HycoBodiesWork)m->work;
   PetscReal gaps = 0, u = 0, most = 0, beyond = 0;
 
-  *kkt = (HycoKKT){.stationarity = HycoBodiesUnbalanced(o)};
+  *kkt = (HycoKKT){.stationarity = HycoBodiesImbalance(o, PETSC_TRUE)};
   /* Displacements along the surfaces too: where all contacts close without a gap, the others are round-off. */
   for (PetscInt i = 0; i < o->bodies->ns; i++) u = PetscMax(u, PetscAbsReal(o->u[i]));
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
@@ -158,7 +158,7 @@ static PetscErrorCode BodiesSolve(HycoROM m, const PetscReal mu[])
   PetscCall(HycoBodiesSolve(o, &s, mu, m->Lambda, &solved));
   PetscCall(ExpandAll(m));
   residual = HycoBodiesMeasure(m, &p->kkt);
-  m->imbalance = HycoBodiesImbalance(o);
+  m->imbalance = HycoBodiesImbalance(o, PETSC_FALSE);
   /* The bound of theory.md: from the samples' error e and the present forces; 0 where nothing is interpolated. */
   p->interpolation_error = HycoBodiesBound(o, &norm);
   PetscCall(HycoBodiesFreeMotion(o, &s, m->Lambda, &p->loose, m->loose));

@@ -193,7 +193,7 @@ static PetscErrorCode BodiesFrictionMeasure(HycoBodiesFriction f, HycoBodiesWork
   kkt->penetration = map.missing / force;
   kkt->adhesion = map.outside / force;
   kkt->complementarity = map.map / force;
-  kkt->stationarity = HycoBodiesUnbalanced(o);
+  kkt->stationarity = HycoBodiesImbalance(o, PETSC_TRUE);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -233,7 +233,7 @@ static PetscErrorCode BodiesPathRecord(HycoPath p)
   w->misfit = PetscMax(w->misfit, BodiesPathMisfit(m, alpha));
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
   PetscCall(HycoTraceRecord(m, PETSC_TRUE, p->begin, &p->now));
-  m->imbalance = PetscMax(m->imbalance, HycoBodiesImbalance(&w->bodies));
+  m->imbalance = PetscMax(m->imbalance, HycoBodiesImbalance(&w->bodies, PETSC_FALSE));
   if (w->friction) PetscCall(RecordFriction(m, &p->now));
   loose = &m->trace.loose[m->trace.n_listed - 1];
   if (w->friction)

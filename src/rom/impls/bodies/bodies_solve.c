@@ -1079,54 +1079,27 @@ PetscErrorCode HycoBodiesSolve(HycoBodiesWork o, const HycoBodiesSurface *s, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The residual of equilibrium along the rigid motions that contact alone prevents, relative to the terms of each,
-   without the round-off of loads (of a basis of length 1) and forces that balance themselves: no other force has to. */
-PetscReal HycoBodiesUnbalanced(HycoBodiesWork o)
+/* beyond: relative to the loads' sums, without the round-off of loads (of a basis of length 1) and forces that balance
+   themselves. */
+PetscReal HycoBodiesImbalance(HycoBodiesWork o, PetscBool beyond)
 {
   const HycoSubstructures b = o->bodies;
-  PetscReal most = 0, all = 0;
+  PetscReal *load, *size, all = 0, most;
 
+  if (!b->p) return beyond ? 0 : -1;
+  PetscCallAbort(PETSC_COMM_SELF, PetscCalloc2(b->p, &load, b->p, &size));
+  for (PetscInt k = 0; k < b->p * b->r; k++) {
+    load[k / b->r] += o->work[k] * o->c[k % b->r];
+    size[k / b->r] += PetscAbsReal(o->work[k] * o->c[k % b->r]);
+  }
+  for (PetscInt i = 0; beyond && i < b->p; i++) {
+    load[i] = HycoBodiesLoadWork(o, i);
+    size[i] = PetscAbsReal(load[i]);
+  }
   for (PetscInt j = 0; j < b->r; j++) all += PetscAbsReal(o->c[j]);
   for (PetscInt k = 0; k < b->ns; k++) all += PetscAbsReal(o->f[k]);
-  for (PetscInt i = 0; i < b->p; i++) {
-    PetscReal sum = HycoBodiesLoadWork(o, i), size = PetscAbsReal(sum), reach = 0;
-
-    for (PetscInt k = 0; k < b->ns; k++) {
-      const PetscReal z = o->Z[k * b->p + i];
-
-      /* Work of the loads against that of the contact forces on motion i, Z^T (F - B^T L) = 0. */
-      sum -= z * o->f[k];
-      size += PetscAbsReal(z * o->f[k]);
-      reach = PetscMax(reach, PetscAbsReal(z));
-    }
-    sum = PetscMax(PetscAbsReal(sum) - HYCO_LOADS_ROUND_OFF * reach * all, 0);
-    if (size > 0) most = PetscMax(most, sum / size);
-  }
-  return most;
-}
-
-/* On a motion along which neither loads nor forces act, as a body's that slides without friction, the terms are
-   round-off of those of the others: it has no balance to miss. */
-PetscReal HycoBodiesImbalance(HycoBodiesWork o)
-{
-  const HycoSubstructures b = o->bodies;
-  PetscReal most = b->p ? 0 : -1, all = 0;
-
-  for (PetscInt k = 0; k < b->ns; k++) all += PetscAbsReal(o->f[k]);
-  for (PetscInt i = 0; i < b->p; i++) {
-    PetscReal sum = 0, terms = 0, reach = 0;
-
-    for (PetscInt j = 0; j < b->r; j++) {
-      sum += o->work[i * b->r + j] * o->c[j];
-      terms += PetscAbsReal(o->work[i * b->r + j] * o->c[j]);
-    }
-    for (PetscInt k = 0; k < b->ns; k++) {
-      sum -= o->Z[k * b->p + i] * o->f[k];
-      terms += PetscAbsReal(o->Z[k * b->p + i] * o->f[k]);
-      reach = PetscMax(reach, PetscAbsReal(o->Z[k * b->p + i]));
-    }
-    if (terms > HYCO_LOADS_ROUND_OFF * reach * all) most = PetscMax(most, PetscAbsReal(sum) / terms);
-  }
+  most = HycoROMImbalance(b->p, b->ns, o->Z, NULL, o->f, load, size, beyond ? HYCO_LOADS_ROUND_OFF * all : 0);
+  PetscCallAbort(PETSC_COMM_SELF, PetscFree2(load, size));
   return most;
 }
 
