@@ -19,7 +19,7 @@
 #include <hycolinear.h>
 #include <hycomaterialimpl.h>
 #include <hycoromimpl.h>
-#include <hycoslip.h>
+#include <hycocontactstate.h>
 #include <hycosolver.h>
 #include <petscblaslapack.h>
 
@@ -353,7 +353,7 @@ PetscErrorCode HycoBodiesFrictionDerive(HycoBodiesFriction friction, PetscInt m,
 /* The normal forces of the solved step; the state of the contacts, whose arrays the friction owns; whether the last
    step has further solutions. */
 void HycoBodiesFrictionNormal(HycoBodiesFriction friction, PetscReal Lambda[]);
-const HycoSlip *HycoBodiesFrictionSlip(HycoBodiesFriction friction);
+HycoContactState HycoBodiesFrictionState(HycoBodiesFriction friction);
 /* Whether a state accepted since the begin left a rigid motion free, which is then named unless name is NULL, or the
    last one has loads but no forces. */
 PetscBool HycoBodiesFrictionFreeMotion(HycoBodiesFriction friction, char name[HYCO_LINE]);

@@ -237,11 +237,11 @@ typedef struct {
   PetscInt n_facing; /* contacts that may close: slave nodes that face a master, and those at obstacles */
   PetscReal overlap; /* largest initial overlap, the gap negative before any displacement */
   PetscReal sliding; /* largest relative tangential motion of a closed contact, over the size of a facet */
-} HycoContactState;
+} HycoContactFacts;
 /* facet: as HycoContactFacets() gives them, of the contacts that no map moves; NULL: fe's mesh has the whole
    surfaces. */
 PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u[], const PetscReal L[],
-                                  const PetscInt *index, const PetscReal facet[], HycoContactState *state);
+                                  const PetscInt *index, const PetscReal facet[], HycoContactFacts *state);
 /* The size of the facets over which the sliding of each contact is measured (pairs->n): the longest edge at the master,
    or else at the slave; 0: neither has any. */
 PetscErrorCode HycoContactFacets(HycoFE fe, const HycoPairs *pairs, PetscReal facet[]);

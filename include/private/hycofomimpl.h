@@ -2,7 +2,7 @@
 #ifndef HYCOFOMIMPL_H
 #define HYCOFOMIMPL_H
 
-#include <hycoslip.h>
+#include <hycocontactstate.h>
 #include <hycocontactimpl.h>
 #include <hycofom.h>
 #include <hycoh5.h>
@@ -19,7 +19,6 @@ typedef struct {
 } HycoGradientStore;
 
 typedef struct _n_HycoPath *HycoPath;
-typedef struct _n_HycoFriction *HycoFriction;
 
 struct _p_HycoFOM {
   PETSCHEADER(int);
@@ -72,7 +71,6 @@ struct _p_HycoFOM {
   PetscInt n_turned; /* number of released motions for which the contacts' normals are turned */
   Vec *released;
   HycoPath path;              /* of a scene with a history, else NULL */
-  HycoFriction friction;      /* of a scene with friction, else NULL */
   HycoSoft soft;              /* with friction: rigid motions that soft springs hold, and those that nothing does */
   HycoGradientStore gradient; /* of HycoFOMGetGradient() */
   HycoSummary summary;
@@ -146,7 +144,7 @@ PetscErrorCode HycoFOMCountDependent(HycoFOM fom, PetscInt *dependent);
 /* The same for m rows and their gaps on one process, displacements u (n_dof) and normal forces lambda; slip: of
    contacts with friction, whose rows have tangents; else NULL: a row for each contact. */
 PetscErrorCode HycoRowsCountDependent(const HycoRows *rows, PetscInt n_dof, const PetscReal u[],
-                                      const PetscReal lambda[], const HycoSlip *slip, PetscInt *dependent);
+                                      const PetscReal lambda[], HycoContactState slip, PetscInt *dependent);
 /* Creates distributed vectors of the motions; VecDestroyVecs() destroys them. Collective. */
 PetscErrorCode HycoFOMMotionVectors(HycoFOM fom, const HycoMotions *motions, Vec **v);
 /* Finds the motions of `soft` at the present K, and forgets them. Collective. */

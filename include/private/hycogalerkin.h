@@ -53,6 +53,7 @@ typedef struct _n_HycoGalerkin {
                             this kind */
   HycoGalerkinPath path; /* of a scene with a history */
   HycoGalerkinFriction friction; /* of its contacts; NULL: none, or each contact has one row */
+  HycoContactState state;        /* with it: of the contacts of A_lambda. The path's */
   HycoWatch watch;
   HycoIndexSets sets;
   Mat K, Kr, Br, Btr;
@@ -115,20 +116,17 @@ PetscErrorCode HycoGalerkinUnpack(HycoROM model);
 PetscErrorCode HycoGalerkinExpand(HycoROM model);
 
 /*
-  Friction on the path (galerkin_friction.c). Create in set-up, after own_pairs; Destroy is NULL-safe. Begin at the
-  start of a path; Rows sets own_rows, Pose the cones of the system, both at fe's parameters of a step; Accept when x
-  and L are those of an accepted step, with U and Lambda set; Show and Record at a listed time, before and after
-  HycoTraceRecord().
+  Friction on the path (galerkin_friction.c), beyond the contacts of A_lambda, whose state is the path's.
+  Create in set-up, after own_pairs, sets n_L; Destroy is NULL-safe. Begin at the start of a path; Rows sets own_rows,
+  at fe's parameters of a step; Accept when x and L are those of an accepted step to t, with U and Lambda set; Show at a
+  listed time, before HycoTraceRecord().
 */
-struct _n_HycoPath;
 PetscErrorCode HycoGalerkinFrictionCreate(HycoROM model);
 PetscErrorCode HycoGalerkinFrictionDestroy(HycoGalerkinFriction *friction);
 PetscErrorCode HycoGalerkinFrictionBegin(HycoROM model);
 PetscErrorCode HycoGalerkinFrictionRows(HycoROM model);
-PetscErrorCode HycoGalerkinFrictionSetCones(HycoROM model);
-PetscErrorCode HycoGalerkinFrictionAccept(HycoROM model, struct _n_HycoPath *path);
+PetscErrorCode HycoGalerkinFrictionAccept(HycoROM model, PetscReal t);
 PetscErrorCode HycoGalerkinFrictionShow(HycoROM model);
-PetscErrorCode HycoGalerkinFrictionRecord(HycoROM model, HycoStep *step);
 /* The first row of contact k of A_lambda in own_rows, and the contact (number in A_lambda) of a row. */
 PetscInt HycoGalerkinFirstRow(HycoGalerkin galerkin, PetscInt k);
 PetscInt HycoGalerkinContactOf(HycoGalerkin galerkin, PetscInt row);

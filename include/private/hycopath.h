@@ -6,6 +6,7 @@
 #ifndef HYCOPATH_H
 #define HYCOPATH_H
 
+#include <hycocontactstate.h>
 #include <hycofomimpl.h>
 #include <hycoinelastic.h>
 
@@ -59,10 +60,21 @@ typedef struct {
   /* The rates of HycoFERates() in the state at t, `begin` or that of the attempt (`end`): all collective, largest over
      all ranks. NULL: steps are not chosen by their error. */
   PetscErrorCode (*rates)(HycoPath, PetscReal t, PetscReal dt, HycoFEState state, PetscReal rate[], PetscReal *largest);
-  PetscErrorCode (*accept)(HycoPath, const HycoStepAttempt *); /* the attempt becomes the state at t */
+  PetscErrorCode (*accept)(HycoPath, const HycoStepAttempt *);          /* the attempt becomes the state at t */
+  PetscErrorCode (*surfaces)(HycoPath, PetscReal u[], PetscReal *most); /* friction: the displacements of the HycoFE
+                                                                           whose rows B has, and the largest of all */
   PetscErrorCode (*record)(HycoPath); /* at a listed time, or at the last time reached: sets `now` */
   PetscErrorCode (*save)(HycoPath);   /* writes the checkpoint */
 } HycoPathOps;
+
+/* The contact system of an iteration, and what has an entry for each row of its B. */
+typedef struct {
+  HycoSystem system;
+  HycoSolver solver;
+  Mat B, Bt;
+  Vec D, Lambda;
+  Vec L_old, gap_work, L_last, L_new, dL[HYCO_ANDERSON]; /* of the path; NULL without contact */
+} HycoPathContact;
 
 struct _n_HycoPath {
   const HycoPathOps *ops;
@@ -71,13 +83,12 @@ struct _n_HycoPath {
   /* borrowed; matrices and system are those of the attempt's time */
   HycoScene scene;
   HycoFE fe;
-  HycoSystem system;
-  HycoSolver solver;
-  Mat K, B, Bt;
-  Vec U, Lambda, rhs, D; /* the solution, and the right-hand side of the contact system */
-  PetscInt n_contacts;   /* length of Lambda */
-  PetscInt n_free;       /* number of unknowns */
-  PetscBool cold;        /* the next contact system is solved without data from the last one */
+  HycoPathContact contact;
+  Mat K;
+  Vec U, rhs;          /* the solution, with contact.Lambda, and the right-hand side of the contact system */
+  PetscInt n_contacts; /* 0: no contact */
+  PetscInt n_free;     /* number of unknowns */
+  PetscBool cold;      /* the next contact system is solved without data from the last one */
   /* options */
   PetscInt method;            /* a HycoNewton */
   PetscInt max_its, substeps; /* substeps: 0: by the error in time */
@@ -100,20 +111,22 @@ struct _n_HycoPath {
   HycoFEState begin, end;
   /* like U: loads only, of the attempt; internal forces, the same */
   Vec F, f_int, r, U_old, work, diagonal;
-  Vec L_old, gap_work;     /* like Lambda; NULL without contact */
   PetscReal *f_local, *u0; /* length: fe's n_dof */
   PetscBool tangent;       /* K is a tangent, not the elastic stiffness */
   PetscInt kept;           /* number of contact systems solved with this K */
   PetscBool flows;         /* some body's law is inelastic */
-  PetscBool has_friction;  /* friction: the contact forces have no potential */
-  char loose[HYCO_LINE];   /* full order with friction: the first motion that no contact force held; "": none */
-  PetscReal loose_at[2];   /* the first and the last time of one */
+  /* Friction (path_friction.c): the state of the contacts of the system with tangents, which the path owns. Where there
+     is another system without tangents, the path takes it while no coefficient is above 0 */
+  HycoContactState friction; /* NULL: the scene has none */
+  PetscBool has_friction;    /* `contact` has tangents: its forces have no potential */
+  HycoPathContact other;     /* the one not used now; its data are the path's. Else empty */
+  char loose[HYCO_LINE];     /* the first motion that no contact force held; "": none */
+  PetscReal loose_at[2];     /* the first and the last time of one */
   char
       no_equilibrium[HYCO_LINE]; /* how a body slides away in a larger step, which halving cannot mend; "": none does */
   /* Anderson's acceleration: differences of iterates and residuals, newest last */
   PetscInt n_mixed;
   Vec dU[HYCO_ANDERSON], dG[HYCO_ANDERSON], U_last, G_last, G;
-  Vec dL[HYCO_ANDERSON], L_last, L_new;
   /* current position on the path */
   PetscReal mu[HYCO_MAX_PARAMETERS], t, dt;
   PetscReal *rate[2];     /* by point: at t, and of the attempt; NULL: ops->rates is */
@@ -189,34 +202,35 @@ void HycoPathNameTimes(const char name[], const PetscReal at[2], char text[HYCO_
 /* Fills the history with the path's results. */
 void HycoPathGetHistory(HycoPath path, HycoHistory *history);
 
+/* -- friction (path_friction.c), where the path has a state of its contacts. Collective -- */
+
+/* The path's vectors of a contact system, whose Lambda is set. */
+PetscErrorCode HycoPathContactSetUp(HycoPathContact *contact);
+PetscErrorCode HycoPathContactReset(HycoPathContact *contact);
+/* The system with tangents, or without: used now or not. */
+HycoPathContact *HycoPathContactGet(HycoPath path, PetscBool tangents);
+/* Called by the path: at its start, no slip; once a step is assembled, its cones; */
+PetscErrorCode HycoPathFrictionBegin(HycoPath path);
+PetscErrorCode HycoPathFrictionSetStep(HycoPath path, PetscReal t);
+/* once it is accepted, before ops->accept: its forces on both systems; bodies stay along motions that no contact force
+   acts on; */
+PetscErrorCode HycoPathFrictionTake(HycoPath path);
+/* after it: the step becomes the state of the contacts. */
+PetscErrorCode HycoPathFrictionAccept(HycoPath path);
+PetscErrorCode HycoPathFrictionDestroy(HycoPath path);
+/* Whether a coefficient of 0 at a contact with a force lets a floating body of the accepted step move. */
+PetscErrorCode HycoPathFrictionMoves(HycoPath path, PetscBool *moves);
+/* In ops->accept: the work of the bodies against the contact forces in the step. */
+PetscErrorCode HycoPathFrictionWork(HycoPath path, PetscReal *work);
 /* -- full order: a HycoPath whose ctx is the HycoFOM -- */
 
-/* Friction (friction.c), once the path's vectors exist. Collective, as all functions below. */
+PetscErrorCode HycoFOMPathCreate(HycoFOM fom);
+/* Friction at full order (friction.c): the system with tangents, and what it adds to that of a step. */
 PetscErrorCode HycoFrictionCreate(HycoFOM fom);
-PetscErrorCode HycoFrictionDestroy(HycoFOM fom);
-/* At the start of a path: no slip. */
-PetscErrorCode HycoFrictionBegin(HycoFOM fom);
-/* After HycoFOMAssemble(): the path's system with tangents, or the one without if no coefficient is above 0. */
 PetscErrorCode HycoFrictionAssemble(HycoFOM fom);
-/* Once a step is accepted, before its work: its forces; bodies stay along motions that no contact force acts on. */
-PetscErrorCode HycoFrictionTake(HycoFOM fom);
-/* Whether a coefficient of 0 at a contact with a force lets a floating body of the accepted step move. */
-PetscErrorCode HycoFrictionMoves(HycoFOM fom, PetscBool *moves);
-/* The work of the bodies against the contact forces in the step that was accepted. */
-PetscErrorCode HycoFrictionWork(HycoFOM fom, PetscReal *work);
-/* The accepted step becomes the state of the contacts. */
-PetscErrorCode HycoFrictionAccept(HycoFOM fom);
-/* The contacts' rows and states at the last accepted time. */
-const HycoSlip *HycoFrictionSlip(HycoFriction friction);
-/* The forces, of all rows, at the accepted time before that. */
-Vec HycoFrictionBefore(HycoFriction friction);
-/* Sets the results of a listed time. */
-PetscErrorCode HycoFrictionMeasure(HycoFOM fom, HycoStep *step);
-/* The state in a checkpoint. `load` after the path is assembled at the checkpoint's time. */
+/* Its state in a checkpoint. `load` after the path is assembled at the checkpoint's time. */
 PetscErrorCode HycoFrictionSave(HycoFOM fom, HycoH5 h5);
 PetscErrorCode HycoFrictionLoad(HycoFOM fom);
-
-PetscErrorCode HycoFOMPathCreate(HycoFOM fom);
 /* Fails if an option of paths is given and the scene has no history. */
 PetscErrorCode HycoPathRefuseOptions(HycoFOM fom);
 /* The gradient of the last path, which is solved again: by its steps, else by the paths beside it. Collective. */

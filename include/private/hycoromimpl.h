@@ -140,13 +140,14 @@ struct _p_HycoROM {
   void *point_ctx;
   /* what setup allocates */
   PetscBool ready;
-  HycoFE fe;            /* on mesh, or on a mesh of its first nodes (galerkin) */
-  PetscInt n, n_L;      /* numbers of unknowns and multipliers of the reduced problem */
-  PetscInt m, *contact; /* the contacts of A_lambda: index in pairs */
-  HycoPairs *of_fe;     /* the same contacts on fe's mesh */
-  HycoPairs pairs;      /* the model's, with what predictions change: masters on moved surfaces, and friction */
-  PetscInt *slave_id;   /* mesh-file tag of each contact's slave */
-  PetscBool spread;     /* Lambda may be nonzero outside A_lambda */
+  HycoFE fe;                 /* on mesh, or on a mesh of its first nodes (galerkin) */
+  PetscInt n, n_L;           /* numbers of unknowns and multipliers of the reduced problem */
+  PetscInt m, *contact;      /* the contacts of A_lambda: index in pairs */
+  HycoPairs *of_fe;          /* the same contacts on fe's mesh */
+  HycoContactState friction; /* of all contacts, on the path of a prediction; borrowed. NULL: none */
+  HycoPairs pairs;           /* the model's, with what predictions change: masters on moved surfaces, and friction */
+  PetscInt *slave_id;        /* mesh-file tag of each contact's slave */
+  PetscBool spread;          /* Lambda may be nonzero outside A_lambda */
   HycoSolver solver;
   void *work; /* the type's */
   /* created when needed */

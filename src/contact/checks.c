@@ -197,7 +197,7 @@ PetscErrorCode HycoContactFacets(HycoFE fe, const HycoPairs *pairs, PetscReal fa
    overlap: of the unloaded gaps. index: from contacts to entries of L and facet (NULL: the same). For remarks to the
    user: a large sliding or overlap makes small displacements or pairs doubtful, but is no error. */
 PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u[], const PetscReal L[],
-                                  const PetscInt index[], const PetscReal facet[], HycoContactState *state)
+                                  const PetscInt index[], const PetscReal facet[], HycoContactFacts *state)
 {
   Sizes sizes[2] = {{NULL, NULL}, {NULL, NULL}};
   PetscReal *normal, *gap;

@@ -154,7 +154,7 @@ PetscErrorCode HycoFOMJudge(HycoFOM f, const PetscReal u[], Vec L, PetscReal ene
     *reason = HYCO_DIVERGED_ENERGY;
   HycoFormat(why, "%s", *reason < 0 ? HycoReasonName(*reason) : "");
   if (*reason == HYCO_DIVERGED_FLOATING) /* on a path with friction L has the rows with tangents */
-    PetscCall(NameLifted(f, f->path ? f->path->Bt : f->Bt, L, name));
+    PetscCall(NameLifted(f, f->path ? f->path->contact.Bt : f->Bt, L, name));
   if (*reason == HYCO_DIVERGED_FLOATING && name[0])
     HycoFormat(why, "%s; no support keeps %s",
                f->path && f->path->has_friction

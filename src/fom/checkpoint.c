@@ -262,7 +262,7 @@ static PetscErrorCode WriteAll(HycoFOM f, HycoH5 h, const Content *c, const char
   PetscFunctionBegin;
   HycoOnRoot(HycoComm(f), WriteContent(f, h, c, key));
   if (f->n_contacts) PetscCall(HycoFOMWriteForces(f, h, "lambda"));
-  if (f->friction) PetscCall(HycoFrictionSave(f, h));
+  if (f->path->friction) PetscCall(HycoFrictionSave(f, h));
   PetscCall(WriteItems(f, h));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -297,7 +297,7 @@ static PetscErrorCode CheckFclib(HycoFOM f)
 
   PetscFunctionBegin;
   HycoCheck(p->fclib[0], "-hyco_write_fclib_time needs a file; name it by -hyco_write_fclib FILE.h5");
-  HycoCheck(f->friction, "-hyco_write_fclib is for contacts with friction, and this scene has none; remove it");
+  HycoCheck(f->path->friction, "-hyco_write_fclib is for contacts with friction, and this scene has none; remove it");
   if (!p->fclib_timed) p->fclib_time = last;
   for (PetscInt k = 0; k < f->scene->n_times && !listed; k++) {
     listed = (PetscBool)(PetscAbsReal(f->scene->times[k] - p->fclib_time) <= tol);
@@ -537,7 +537,7 @@ PetscErrorCode HycoPathLoad(HycoFOM f)
   PetscCall(FreeContent(&c));
   /* Before the contacts' forces are used: B and the masters are those of the resumed time. */
   PetscCall(HycoPathAssemble(p, p->t)); /* quantities available without another step */
-  if (f->friction) PetscCall(HycoFrictionLoad(f));
+  if (f->path->friction) PetscCall(HycoFrictionLoad(f));
   PetscCall(HycoFOMGather(f));
   PetscCall(HycoSeriesRestore(f));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -3,7 +3,7 @@
 #include <hycogradient.h>
 #include <hycopath.h>
 
-/* NULL-safe; the last reference frees. Friction before the path: it gives the path's vectors back. What is aliased
+/* NULL-safe; the last reference frees. What is aliased
    on one rank (surface, fe_surface, u_surface) is freed once. */
 PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
 {
@@ -12,7 +12,6 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   PetscFunctionBegin;
   HycoDestroyBegin(fom, HYCO_FOM_CLASSID);
   f = *fom;
-  PetscCall(HycoFrictionDestroy(f));
   PetscCall(HycoFOMForgetSoft(f));
   PetscCall(HycoPathFree(&f->path));
   HycoDestroyAll(&f->solver, &f->system, &f->given_solver, &f->given_system, &f->given_F, &f->K, &f->B, &f->Bt, &f->U,

@@ -10,7 +10,7 @@
 
 /* By row, from the contacts' normal forces: a tangent that sticks has that of its normal, since it may give forces to
    others, and others have 0. slip: NULL: a row for each contact. */
-static void RowForces(const HycoSlip *slip, PetscInt m, const PetscReal lambda[], PetscReal force[],
+static void RowForces(HycoContactState slip, PetscInt m, const PetscReal lambda[], PetscReal force[],
                       PetscBool tangent[])
 {
   for (PetscInt k = 0; k < (slip ? slip->n : m); k++) {
@@ -207,7 +207,7 @@ static PetscErrorCode CountRemaining(HycoFOM f, const HycoRows *r, const PetscRe
 }
 
 /* Rows that share no unknown with another closed row are independent; only the rest needs a rank. */
-static PetscErrorCode ForceRankCount(HycoFOM f, const HycoSlip *slip, HycoRows *r, PetscReal force[],
+static PetscErrorCode ForceRankCount(HycoFOM f, HycoContactState slip, HycoRows *r, PetscReal force[],
                                      PetscBool tangent[], PetscBool in[], PetscInt *dependent)
 {
   PetscFunctionBegin;
@@ -226,7 +226,7 @@ static PetscErrorCode ForceRankCount(HycoFOM f, const HycoSlip *slip, HycoRows *
 /* By how many the rows of closed contacts exceed their rank: contact forces are unique if 0. Collective. */
 PetscErrorCode HycoFOMCountDependent(HycoFOM f, PetscInt *dependent)
 {
-  const HycoSlip *slip = f->friction ? HycoFrictionSlip(f->friction) : NULL;
+  const HycoContactState slip = f->path ? f->path->friction : NULL;
   const PetscInt m = slip ? slip->row[slip->n] : f->pairs.n;
   HycoRows r = {0};
   PetscReal *force;
@@ -262,7 +262,7 @@ static PetscErrorCode AcceptResidual(const HycoRows *r, const PetscBool in[], Hy
 
 /* The same for the rows of a reduced system, on one process; dof < n_dof. */
 PetscErrorCode HycoRowsCountDependent(const HycoRows *r, PetscInt n_dof, const PetscReal u[], const PetscReal lambda[],
-                                      const HycoSlip *slip, PetscInt *dependent)
+                                      HycoContactState slip, PetscInt *dependent)
 {
   const PetscInt m = r->n;
   HycoRows rest = {0};

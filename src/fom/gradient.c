@@ -157,7 +157,7 @@ static PetscErrorCode GradientData(Work *o, const HycoDifference *d, PetscInt j,
 static PetscErrorCode SetNormal(Work *o, PetscReal step)
 {
   HycoFOM f = o->f;
-  const HycoSlip *s = o->has_friction ? HycoFrictionSlip(f->friction) : NULL;
+  const HycoContactState s = o->has_friction ? f->path->friction : NULL;
   const PetscScalar *L, *dL;
   PetscScalar *normal;
 
@@ -375,7 +375,7 @@ static PetscErrorCode GradientColumn(Work *o, PetscInt p, HycoGradient *gradient
 static PetscErrorCode CreateContacts(Work *o)
 {
   HycoFOM f = o->f;
-  const Vec L = o->along ? f->path->Lambda : f->Lambda, D = o->along ? f->path->D : f->D;
+  const Vec L = o->along ? f->path->contact.Lambda : f->Lambda, D = o->along ? f->path->contact.D : f->D;
   PetscReal bu = 0, d = 0;
 
   PetscFunctionBegin;
@@ -383,10 +383,10 @@ static PetscErrorCode CreateContacts(Work *o)
   PetscCall(VecCopy(L, o->L));
   for (PetscInt j = 0; j < 5; j++) PetscCall(VecDuplicate(L, &o->W[j]));
   PetscCall(VecNorm(D, NORM_INFINITY, &d));
-  PetscCall(MatMult(o->along ? f->path->B : f->B, f->U, o->g));
+  PetscCall(MatMult(o->along ? f->path->contact.B : f->B, f->U, o->g));
   PetscCall(VecNorm(o->g, NORM_INFINITY, &bu));
   o->size = PetscMax(d, bu);
-  if (!o->along || !f->friction) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!o->along || !f->path->friction) PetscFunctionReturn(PETSC_SUCCESS);
   o->has_friction = HycoSensitivityHasFriction(o->along);
   HycoVecDuplicate(L, &o->C[0], &o->C[1], &o->C[2], &o->dC, &o->dW);
   PetscCall(VecDuplicate(f->Lambda, &o->normal));
@@ -403,16 +403,15 @@ static PetscErrorCode GradientDetermine(Work *o)
   PetscReal most = 0, moved;
 
   PetscFunctionBegin;
-  PetscCall(HycoSolverTangentCreate(o->along ? f->path->solver : f->solver, o->U, o->L,
-                                    o->has_friction ? HycoFrictionBefore(f->friction) : NULL, &o->tangent,
-                                    &o->regular));
+  PetscCall(HycoSolverTangentCreate(o->along ? f->path->contact.solver : f->solver, o->U, o->L,
+                                    o->has_friction ? f->path->friction->L_before : NULL, &o->tangent, &o->regular));
   if (!f->n_contacts || o->has_friction) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecNorm(o->L, NORM_INFINITY, &most));
   if (most > 0) PetscCall(HycoFOMNameFreeMotion(f, name));
   o->regular = (PetscBool)(o->regular && !name[0]);
   if (o->along && !o->regular) {
     PetscCall(VecNorm(o->U, NORM_INFINITY, &moved));
-    o->idle = o->regular = (PetscBool)(most == 0 && moved == 0 && !f->friction);
+    o->idle = o->regular = (PetscBool)(most == 0 && moved == 0 && !f->path->friction);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCheck(o->regular || most > 0, HycoComm(f), PETSC_ERR_USER, HYCO_TANGENT_UNPRESSED);
@@ -434,7 +433,7 @@ static PetscErrorCode GradientCreate(Work *o)
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(o->mu, f->fe->mu, f->scene->n_variables));
   o->stress = f->sigma_ready;
-  o->remembers = (PetscBool)(o->along && (f->friction || HycoSensitivityFlows(o->along)));
+  o->remembers = (PetscBool)(o->along && (f->path->friction || HycoSensitivityFlows(o->along)));
   PetscCall(PetscCalloc1(6 * f->scene->n_quantities + 1, &o->output));
   PetscCall(VecDuplicate(f->U, &o->U));
   PetscCall(VecCopy(f->U, o->U));

@@ -54,19 +54,30 @@ PetscErrorCode HycoPathSetUp(HycoPath p)
 {
   /* In the layout of the model's unknowns: of the whole mesh, or of a reduced system. */
   Vec *likeU[] = {&p->F, &p->f_int, &p->r, &p->U_old, &p->work, &p->diagonal, &p->U_last, &p->G_last, &p->G};
-  Vec *likeL[] = {&p->L_old, &p->gap_work, &p->L_last, &p->L_new};
 
   PetscFunctionBegin;
   for (size_t k = 0; k < sizeof(likeU) / sizeof(likeU[0]); k++) PetscCall(VecDuplicate(p->U, likeU[k]));
-  for (size_t k = 0; k < sizeof(likeL) / sizeof(likeL[0]) && p->n_contacts; k++)
-    PetscCall(VecDuplicate(p->Lambda, likeL[k]));
-  for (PetscInt j = 0; j < HYCO_ANDERSON; j++) {
-    HycoVecDuplicate(p->U, &p->dU[j], &p->dG[j]);
-    if (p->n_contacts) PetscCall(VecDuplicate(p->Lambda, &p->dL[j]));
-  }
+  for (PetscInt j = 0; j < HYCO_ANDERSON; j++) HycoVecDuplicate(p->U, &p->dU[j], &p->dG[j]);
+  if (p->n_contacts) PetscCall(HycoPathContactSetUp(&p->contact));
   PetscCall(PetscMalloc1(p->fe->n_dof, &p->f_local));
   PetscCall(PetscMalloc1(p->fe->n_dof, &p->u0));
   PetscCall(PetscCalloc1(p->scene->n_times + 1, &p->steps));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPathContactSetUp(HycoPathContact *c)
+{
+  PetscFunctionBegin;
+  HycoVecDuplicate(c->Lambda, &c->L_old, &c->gap_work, &c->L_last, &c->L_new);
+  for (PetscInt j = 0; j < HYCO_ANDERSON; j++) PetscCall(VecDuplicate(c->Lambda, &c->dL[j]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPathContactReset(HycoPathContact *c)
+{
+  PetscFunctionBegin;
+  HycoDestroyAll(&c->L_old, &c->gap_work, &c->L_last, &c->L_new);
+  for (PetscInt j = 0; j < HYCO_ANDERSON; j++) PetscCall(VecDestroy(&c->dL[j]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -77,15 +88,11 @@ PetscErrorCode HycoPathFree(HycoPath *path)
 
   PetscFunctionBegin;
   if (!p) PetscFunctionReturn(PETSC_SUCCESS);
-  {
-    Vec *vec[] = {&p->F,      &p->F_old,  &p->f_int, &p->f_old, &p->r,        &p->U_old,  &p->work, &p->diagonal,
-                  &p->U_last, &p->G_last, &p->G,     &p->L_old, &p->gap_work, &p->L_last, &p->L_new};
-
-    for (size_t k = 0; k < sizeof(vec) / sizeof(vec[0]); k++) PetscCall(VecDestroy(vec[k]));
-  }
-  for (PetscInt j = 0; j < HYCO_ANDERSON; j++) {
-    HycoDestroyAll(&p->dU[j], &p->dG[j], &p->dL[j]);
-  }
+  PetscCall(HycoPathFrictionDestroy(p));
+  PetscCall(HycoPathContactReset(&p->contact));
+  HycoDestroyAll(&p->F, &p->F_old, &p->f_int, &p->f_old, &p->r, &p->U_old, &p->work, &p->diagonal, &p->U_last,
+                 &p->G_last, &p->G);
+  for (PetscInt j = 0; j < HYCO_ANDERSON; j++) HycoDestroyAll(&p->dU[j], &p->dG[j]);
   PetscCall(HycoSeriesDestroy(&p->series));
   PetscCall(HycoFEStateDestroy(&p->begin));
   PetscCall(HycoFEStateDestroy(&p->end));
@@ -154,7 +161,7 @@ PetscErrorCode HycoPathBegin(HycoPath p, const PetscReal mu[])
   p->why[0] = '\0';
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
   PetscCall(VecSet(p->U, 0));
-  if (p->n_contacts) PetscCall(VecSet(p->Lambda, 0));
+  if (p->n_contacts) PetscCall(VecSet(p->contact.Lambda, 0));
   if (p->tangent) p->fe->ready = PETSC_FALSE; /* K must be assembled again */
   p->tangent = PETSC_FALSE;
   PetscCall(HycoFEStateDestroy(&p->begin));
@@ -164,6 +171,7 @@ PetscErrorCode HycoPathBegin(HycoPath p, const PetscReal mu[])
   HycoOnEach(p->comm, HycoFEStateCreate(p->fe, &p->begin));
   HycoOnEach(p->comm, HycoFEStateCreate(p->fe, &p->end));
   p->fe->ready = PETSC_FALSE; /* nothing is assembled for it yet */
+  PetscCall(HycoPathFrictionBegin(p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -198,7 +206,14 @@ static PetscErrorCode HistoryAccept(HycoPath p, PetscReal t1, const HycoStepAtte
   HycoGrow(p->n_taken, p->room_taken, p->taken);
   p->taken[p->n_taken++] = p->t;
   /* Last: the op may read the accepted time and state. */
+  PetscCall(HycoPathFrictionTake(p));
   PetscCall((*p->ops->accept)(p, a));
+  PetscCall(HycoPathFrictionAccept(p));
+  /* At the listed time ops->record gathers, and calls the monitor. */
+  if (p->between && p->t < p->scene->times[p->step]) {
+    PetscCall(HycoFOMGather((HycoFOM)p->ctx));
+    PetscCall((*p->between)((HycoFOM)p->ctx, p->monitor_ctx));
+  }
   if (p->passes) PetscCall((*p->passes)(p, t0, p->passes_ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

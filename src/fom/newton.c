@@ -53,7 +53,7 @@ static PetscErrorCode NewtonEvaluate(HycoPath p, PetscReal t0, PetscReal t1, Pet
   PetscCall(VecNorm(p->f_int, NORM_2, &size[0]));
   PetscCall(VecNorm(p->F, NORM_2, &size[1]));
   if (p->n_contacts) {
-    PetscCall(MatMult(p->Bt, p->Lambda, p->work));
+    PetscCall(MatMult(p->contact.Bt, p->contact.Lambda, p->work));
     PetscCall(VecNorm(p->work, NORM_2, &size[2]));
     /* ops->step left F - f_int in r. */
     PetscCall(VecAXPY(p->r, -1, p->work));
@@ -126,7 +126,7 @@ static PetscErrorCode RightSide(HycoPath p, PetscBool first, PetscReal *least)
   PetscCall(MatMult(p->K, p->U, p->rhs));
   PetscCall(NewtonRoundOff(p, least));
   PetscCall(VecAXPY(p->rhs, 1, p->r));
-  if (p->n_contacts) PetscCall(MatMultAdd(p->Bt, p->Lambda, p->rhs, p->rhs));
+  if (p->n_contacts) PetscCall(MatMultAdd(p->contact.Bt, p->contact.Lambda, p->rhs, p->rhs));
   if (first) PetscCall((*p->ops->moves)(p, p->rhs));
   if (*least >= 0) PetscCall(VecNorm(p->rhs, NORM_INFINITY, &size));
   if (size <= *least) PetscCall(VecSet(p->rhs, 0));
@@ -164,21 +164,21 @@ static PetscErrorCode SolveSystem(HycoPath p, PetscBool first, const Progress *n
 
   PetscFunctionBegin;
   PetscCall(RightSide(p, first, &least));
-  PetscCall(HycoSystemSetVectors(p->system, p->rhs, p->D));
-  HycoSystemSetRounding(p->system, PetscMax(least, 0));
-  PetscCall(HycoSolverSetSystem(p->solver, p->system));
+  PetscCall(HycoSystemSetVectors(p->contact.system, p->rhs, p->contact.D));
+  HycoSystemSetRounding(p->contact.system, PetscMax(least, 0));
+  PetscCall(HycoSolverSetSystem(p->contact.solver, p->contact.system));
   PetscCall(VecCopy(p->U, p->G));
-  if (p->n_contacts) PetscCall(VecCopy(p->Lambda, p->L_new));
-  if (p->cold) PetscCall(HycoSolverSetWarmStart(p->solver, PETSC_FALSE));
+  if (p->n_contacts) PetscCall(VecCopy(p->contact.Lambda, p->contact.L_new));
+  if (p->cold) PetscCall(HycoSolverSetWarmStart(p->contact.solver, PETSC_FALSE));
   /* A solver with a factor ignores it. */
-  PetscCall(HycoSolverSetTarget(p->solver, NewtonTolerance(p, now)));
-  HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(p->solver, p->G, p->L_new));
-  if (p->cold) PetscCall(HycoSolverSetWarmStart(p->solver, PETSC_TRUE));
+  PetscCall(HycoSolverSetTarget(p->contact.solver, NewtonTolerance(p, now)));
+  HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(p->contact.solver, p->G, p->contact.L_new));
+  if (p->cold) PetscCall(HycoSolverSetWarmStart(p->contact.solver, PETSC_TRUE));
   p->cold = PETSC_FALSE;
-  PetscCall(HycoSolverGetReason(p->solver, &reason));
-  PetscCall(HycoSolverGetSeconds(p->solver, &factor, &solve));
-  PetscCall(HycoSolverGetIterations(p->solver, &its));
-  PetscCall(HycoSolverGetLinearIterations(p->solver, &linear, &most));
+  PetscCall(HycoSolverGetReason(p->contact.solver, &reason));
+  PetscCall(HycoSolverGetSeconds(p->contact.solver, &factor, &solve));
+  PetscCall(HycoSolverGetIterations(p->contact.solver, &its));
+  PetscCall(HycoSolverGetLinearIterations(p->contact.solver, &linear, &most));
   p->kept++;
   a->iterations++;
   /* Seconds of a new factor; 0: a kept one. */
@@ -214,7 +214,7 @@ static PetscErrorCode NewtonAdvance(HycoPath p, PetscBool feasible, const HycoSt
 
   PetscFunctionBegin;
   PetscCall(VecCopy(p->U, p->U_last));
-  if (p->n_contacts) PetscCall(VecCopy(p->Lambda, p->L_last));
+  if (p->n_contacts) PetscCall(VecCopy(p->contact.Lambda, p->contact.L_last));
   now->feasible = feasible;
   /* Friction has no potential: its forces depend on the normal ones. */
   now->search = (PetscBool)(feasible && a->law.has_potential && !p->has_friction);
@@ -223,8 +223,8 @@ static PetscErrorCode NewtonAdvance(HycoPath p, PetscBool feasible, const HycoSt
     PetscCall(VecWAXPY(p->work, -1, p->U, p->G));
     PetscCall(VecDot(p->r, p->work, &now->slope));
     if (p->n_contacts) {
-      PetscCall(MatMult(p->B, p->work, p->gap_work));
-      PetscCall(VecDot(p->gap_work, p->Lambda, &work));
+      PetscCall(MatMult(p->contact.B, p->work, p->contact.gap_work));
+      PetscCall(VecDot(p->contact.gap_work, p->contact.Lambda, &work));
       now->slope += work;
     }
     now->slope = -now->slope;
@@ -232,7 +232,7 @@ static PetscErrorCode NewtonAdvance(HycoPath p, PetscBool feasible, const HycoSt
     now->potential = a->law.potential - work;
   }
   PetscCall(VecCopy(p->G, p->U));
-  if (p->n_contacts) PetscCall(VecCopy(p->L_new, p->Lambda));
+  if (p->n_contacts) PetscCall(VecCopy(p->contact.L_new, p->contact.Lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -266,7 +266,7 @@ static PetscErrorCode NewtonShorten(HycoPath p, PetscReal t0, PetscReal t1, Hyco
   for (PetscInt k = 0; k < SHORTENED && !lower && now->feasible; k++) {
     now->share /= 2;
     PetscCall(VecAXPBY(p->U, 0.5, 0.5, p->U_last));
-    if (p->n_contacts) PetscCall(VecAXPBY(p->Lambda, 0.5, 0.5, p->L_last));
+    if (p->n_contacts) PetscCall(VecAXPBY(p->contact.Lambda, 0.5, 0.5, p->contact.L_last));
     /* NewtonEvaluate() shifts the residuals: those of the refused point are taken out of the history. */
     now->residual[2] = now->residual[1]; /* the previous one */
     now->residual[1] = now->residual[0];
@@ -354,7 +354,7 @@ static PetscErrorCode NewtonExtrapolate(HycoPath p, PetscInt k)
 
   PetscFunctionBegin;
   PetscCall(VecWAXPY(p->work, -1, p->U, p->G)); /* g */
-  if (k > 1) PetscCall(SetChanged(p, p->L_new, p->L_last, &changed));
+  if (k > 1) PetscCall(SetChanged(p, p->contact.L_new, p->contact.L_last, &changed));
   /* The differences so far are forgotten. */
   if (k <= 1 || changed)
     p->n_mixed = 0;
@@ -362,21 +362,21 @@ static PetscErrorCode NewtonExtrapolate(HycoPath p, PetscInt k)
     /* The newest first; the oldest is overwritten. */
     PetscCall(NewtonStore(p->n_mixed, p->dU, p->G, p->U_last));
     PetscCall(NewtonStore(p->n_mixed, p->dG, p->work, p->G_last));
-    if (p->n_contacts) PetscCall(NewtonStore(p->n_mixed, p->dL, p->L_new, p->L_last));
+    if (p->n_contacts) PetscCall(NewtonStore(p->n_mixed, p->contact.dL, p->contact.L_new, p->contact.L_last));
     p->n_mixed = PetscMin(p->n_mixed + 1, HYCO_ANDERSON);
   }
   PetscCall(VecCopy(p->G, p->U_last));
   PetscCall(VecCopy(p->work, p->G_last));
   PetscCall(VecCopy(p->G, p->U));
   if (p->n_contacts) {
-    PetscCall(VecCopy(p->L_new, p->L_last));
-    PetscCall(VecCopy(p->L_new, p->Lambda));
+    PetscCall(VecCopy(p->contact.L_new, p->contact.L_last));
+    PetscCall(VecCopy(p->contact.L_new, p->contact.Lambda));
   }
   if (p->n_mixed) PetscCall(LeastSquares(p->n_mixed, p->dG, p->work, gamma));
   for (PetscInt j = 0; j < p->n_mixed; j++) {
     PetscCall(VecAXPY(p->U, -gamma[j], p->dU[j]));
     /* Forces are mixed like displacements: on a fixed set both are affine in the iterate. */
-    if (p->n_contacts) PetscCall(VecAXPY(p->Lambda, -gamma[j], p->dL[j]));
+    if (p->n_contacts) PetscCall(VecAXPY(p->contact.Lambda, -gamma[j], p->contact.dL[j]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -391,8 +391,8 @@ static PetscErrorCode NewtonJudge(HycoPath p, const Progress *now, HycoStepAttem
 
   PetscFunctionBegin;
   PetscCall(RightSide(p, PETSC_FALSE, &least));
-  PetscCall(HycoSystemSetVectors(p->system, p->rhs, p->D));
-  HycoLogged(HYCO_EVENT_KKT, HycoSystemComputeKKT(p->system, p->U, p->Lambda, kkt));
+  PetscCall(HycoSystemSetVectors(p->contact.system, p->rhs, p->contact.D));
+  HycoLogged(HYCO_EVENT_KKT, HycoSystemComputeKKT(p->contact.system, p->U, p->contact.Lambda, kkt));
   *worst = PetscMax(kkt->penetration, PetscMax(kkt->adhesion, kkt->complementarity));
   a->residual = now->residual[2] / size;
   kkt->rounding = now->residual[2] <= now->floor ? a->residual : 0;
@@ -491,7 +491,7 @@ PetscErrorCode HycoPathRestore(HycoPath p)
 
   PetscFunctionBegin;
   PetscCall(VecCopy(p->U_old, p->U));
-  if (p->n_contacts) PetscCall(VecCopy(p->L_old, p->Lambda));
+  if (p->n_contacts) PetscCall(VecCopy(p->contact.L_old, p->contact.Lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -505,6 +505,7 @@ PetscErrorCode HycoPathAssemble(HycoPath p, PetscReal t1)
   HycoSceneSetTime(p->scene, p->mu, t1, mu);
   PetscCall((*p->ops->assemble)(p, mu, (PetscBool)(HycoPathMethod(p) == HYCO_NEWTON_ELASTIC)));
   if (p->fe->stiffness_changed) p->tangent = PETSC_FALSE;
+  PetscCall(HycoPathFrictionSetStep(p, t1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -532,7 +533,7 @@ PetscErrorCode HycoPathAttempt(HycoPath p, PetscReal t0, PetscReal t1, HycoStepA
   PetscFunctionBegin;
   PetscCall(PetscMemzero(a, sizeof(*a)));
   PetscCall(VecCopy(p->U, p->U_old));
-  if (p->n_contacts) PetscCall(VecCopy(p->Lambda, p->L_old));
+  if (p->n_contacts) PetscCall(VecCopy(p->contact.Lambda, p->contact.L_old));
   PetscCall(HycoPathAssemble(p, t1));
   /* Models with an iteration of their own (bodies) need neither K nor its tangents here. */
   if (p->ops->iterate) {

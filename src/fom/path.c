@@ -95,8 +95,8 @@ static PetscErrorCode FOMPathAssemble(HycoPath p, const PetscReal mu[], PetscBoo
   PetscCheck(!f->n_pins, p->comm, PETSC_ERR_USER,
              "-hyco_regularise is for scenes without a history; fix the unconstrained motion (%s)",
              f->summary.regularised);
-  p->B = f->B;
-  p->Bt = f->Bt;
+  HycoPathContactGet(p, PETSC_FALSE)->B = f->B;
+  HycoPathContactGet(p, PETSC_FALSE)->Bt = f->Bt;
   p->n_free = f->n_free;
   /* HycoFOMAssemble() has the lifting of all prescribed displacements in f->F, which the iterations overwrite as
      their right-hand side; p->F has the loads alone. */
@@ -104,7 +104,7 @@ static PetscErrorCode FOMPathAssemble(HycoPath p, const PetscReal mu[], PetscBoo
   f->fe->lifted = PETSC_FALSE;
   HycoOnEach(p->comm, HycoFEAssembleForce(f->fe, p->F));
   f->fe->lifted = lifted;
-  if (f->friction) PetscCall(HycoFrictionAssemble(f));
+  if (p->friction) PetscCall(HycoFrictionAssemble(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -211,14 +211,14 @@ static PetscErrorCode ContactWork(HycoFOM f, PetscReal *sum)
   *sum = 0;
   if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
   /* Tangential forces do work as well, with rows of their own. */
-  if (f->friction) {
-    PetscCall(HycoFrictionWork(f, sum));
+  if (p->friction) {
+    PetscCall(HycoPathFrictionWork(p, sum));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(VecWAXPY(p->work, -1, p->U_old, f->U));
-  PetscCall(MatMult(f->B, p->work, p->gap_work));
-  PetscCall(VecWAXPY(p->L_new, 1, p->L_old, f->Lambda));
-  PetscCall(VecDot(p->L_new, p->gap_work, sum));
+  PetscCall(MatMult(f->B, p->work, p->contact.gap_work));
+  PetscCall(VecWAXPY(p->contact.L_new, 1, p->contact.L_old, f->Lambda));
+  PetscCall(VecDot(p->contact.L_new, p->contact.gap_work, sum));
   *sum /= 2;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -284,7 +284,7 @@ static PetscErrorCode JudgeStep(HycoPath p, HycoReason reason, char why[HYCO_LIN
 
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(f->U_local, &u));
-  PetscCall(HycoFOMJudge(f, u, p->L_new, 0, &reason, &relative, why));
+  PetscCall(HycoFOMJudge(f, u, p->contact.L_new, 0, &reason, &relative, why));
   PetscCall(VecRestoreArrayRead(f->U_local, &u));
   if (reason == HYCO_DIVERGED_FLOATING) HycoFormat(p->no_equilibrium, "%s", why);
   /* Within round-off of the largest load that friction balances: what ends the path is what comes after it. */
@@ -292,24 +292,27 @@ static PetscErrorCode JudgeStep(HycoPath p, HycoReason reason, char why[HYCO_LIN
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the step's energies, keeps F and f_int for the next one; between listed times the monitor gets the gathered
-   solution. */
+/* Adds the step's energies, keeps F and f_int for the next one. */
 static PetscErrorCode FOMPathAccept(HycoPath p, const HycoStepAttempt *a)
 {
   PetscReal defect = 0;
 
   PetscFunctionBegin;
-  if (((HycoFOM)p->ctx)->friction) PetscCall(HycoFrictionTake((HycoFOM)p->ctx));
   PetscCall(AddWork((HycoFOM)p->ctx, &a->law, &defect));
   PetscCall(VecCopy(p->F, p->F_old));
   PetscCall(VecCopy(p->f_int, p->f_old));
-  if (((HycoFOM)p->ctx)->friction) PetscCall(HycoFrictionAccept((HycoFOM)p->ctx));
   p->now.energy_defect = PetscMax(p->now.energy_defect, defect);
-  /* At the listed time FOMPathRecord() gathers, and calls the monitor. */
-  if (p->between && p->t < p->scene->times[p->step]) {
-    PetscCall(HycoFOMGather((HycoFOM)p->ctx));
-    PetscCall((*p->between)((HycoFOM)p->ctx, p->monitor_ctx));
-  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FOMPathSurfaces(HycoPath p, PetscReal u[], PetscReal *most)
+{
+  HycoFOM f = (HycoFOM)p->ctx;
+
+  PetscFunctionBegin;
+  PetscCall(VecNorm(f->U, NORM_INFINITY, most));
+  PetscCall(HycoFOMToSurface(f, f->U, u));
+  HycoFEComplete(f->fe_surface, u);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -363,7 +366,7 @@ static PetscErrorCode MeasureContacts(HycoFOM f, HycoStep *s)
 /* After HycoFOMGather(). Collective. */
 static PetscErrorCode MeasureSliding(HycoFOM f, PetscReal *sliding)
 {
-  HycoContactState state = {0};
+  HycoContactFacts state = {0};
 
   PetscFunctionBegin;
   if (f->n_contacts)
@@ -402,7 +405,7 @@ static PetscErrorCode FOMPathRecord(HycoPath p)
   s->stored = p->work_done.stored;
   s->dissipated = p->work_done.dissipated;
   s->thermal = p->work_done.thermal + p->work_done.moduli;
-  if (f->friction) PetscCall(HycoFrictionMeasure(f, s));
+  if (p->friction) PetscCall(HycoContactStateMeasure(p->friction, s));
   PetscCall(HycoFOMGather(f));
   f->solved = PETSC_TRUE;
   f->sigma_ready = f->all_ready = PETSC_FALSE;
@@ -437,6 +440,7 @@ PetscErrorCode HycoFOMPathCreate(HycoFOM f)
                                   .judge = JudgeStep,
                                   .rates = FOMPathRates,
                                   .accept = FOMPathAccept,
+                                  .surfaces = FOMPathSurfaces,
                                   .record = FOMPathRecord,
                                   .save = FOMPathSave};
   HycoPath p = f->path;
@@ -445,14 +449,14 @@ PetscErrorCode HycoFOMPathCreate(HycoFOM f)
   p->ops = &ops;
   p->ctx = f;
   p->fe = f->fe;
-  p->system = f->system;
-  p->solver = f->solver;
+  p->contact.system = f->system;
+  p->contact.solver = f->solver;
   p->K = f->K;
   p->U = f->U;
-  p->Lambda = f->Lambda;
+  p->contact.Lambda = f->Lambda;
   /* The solver's right-hand side: the path writes K U + F - f_int there, and keeps its loads in a vector of its own. */
   p->rhs = f->F;
-  p->D = f->D;
+  p->contact.D = f->D;
   p->n_contacts = f->n_contacts;
   PetscCall(HycoPathSetUp(p));
   HycoVecDuplicate(f->U, &p->F_old, &p->f_old);
@@ -468,7 +472,6 @@ PetscErrorCode HycoPathSolve(HycoFOM f, const PetscReal mu[])
 
   PetscFunctionBegin;
   PetscCall(HycoPathBegin(p, mu));
-  if (f->friction) PetscCall(HycoFrictionBegin(f));
   PetscCall(PetscMemzero(&p->work_done, sizeof(p->work_done)));
   PetscCall(VecSet(p->F_old, 0));
   PetscCall(VecSet(p->f_old, 0));

@@ -84,7 +84,7 @@ static PetscErrorCode PathGradientPass(HycoPath p, PetscReal t0, void *context)
   HycoGradient at = {.n_outputs = n, .n_parameters = np};
 
   PetscFunctionBegin;
-  if (!o->done || (!lists && !f->friction && !p->flows)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!o->done || (!lists && !f->path->friction && !p->flows)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSensitivityAdvance(o->along, t0, &o->done));
   if (o->done) PetscCall(HycoFOMStateGradient(f, o->along, lists ? &there : NULL, &at, &o->done));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -155,7 +155,7 @@ PetscErrorCode HycoPathGradient(HycoFOM f, HycoGradient *gradient)
   PetscFunctionBegin;
   HycoCheck(p->ended, "there is no gradient: the path ends at t = %g, before its last time", (double)p->t);
   PetscCall(PetscArraycpy(mu, f->fe->mu, f->scene->n_variables));
-  if (!p->solver->iterative) HycoOnError(BySteps(f, mu, gradient, &done), f->solved = PETSC_FALSE);
+  if (!p->contact.solver->iterative) HycoOnError(BySteps(f, mu, gradient, &done), f->solved = PETSC_FALSE);
   if (!done) HycoOnError(PathGradientPerturbedResidual(f, mu, gradient), f->solved = PETSC_FALSE);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

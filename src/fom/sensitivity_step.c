@@ -64,7 +64,7 @@ PetscErrorCode HycoSensitivityCreate(HycoFOM f, HycoSensitivityStep *along)
   a = *along;
   a->f = f;
   if (f->path->flows) PetscCall(CreateStates(a));
-  if (!f->friction) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!f->path->friction) PetscFunctionReturn(PETSC_SUCCESS);
   a->n_dof = f->fe_surface->n_dof;
   PetscCall(PetscCalloc1(a->n_dof + 1, &a->u_old));
   PetscCall(PetscMalloc1(a->n_dof + 1, &a->moved));
@@ -88,7 +88,7 @@ static void ShowPath(HycoSensitivityStep a)
     p->f_old = a->f_path;
     a->accepted = NULL;
   }
-  if (a->f->friction) a->f->pairs.shear = &HycoFrictionSlip(a->f->friction)->shear;
+  if (a->f->path->friction) a->f->pairs.shear = &a->f->path->friction->shear;
 }
 
 /* Also after an error. */
@@ -194,8 +194,8 @@ PetscErrorCode HycoSensitivityAdvance(HycoSensitivityStep a, PetscReal t0, Petsc
   PetscFunctionBegin;
   a->t0 = t0;
   a->has_friction = p->has_friction;
-  if (a->f->friction) PetscCall(HycoFrictionMoves(a->f, &moves));
-  *able = (PetscBool)(!moves && !p->solver->iterative && LawsHaveDerivatives(p->scene));
+  if (a->f->path->friction) PetscCall(HycoPathFrictionMoves(p, &moves));
+  *able = (PetscBool)(!moves && !p->contact.solver->iterative && LawsHaveDerivatives(p->scene));
   if (*able && p->flows) {
     PetscCall(LineariseTangent(a, able));
     if (!*able) PetscCall(LeaveTangent(a));
@@ -239,15 +239,14 @@ PetscErrorCode HycoSensitivityRows(HycoSensitivityStep a, PetscInt parameter, Pe
   PetscFunctionBegin;
   PetscCheck(a->n_dof == f->fe_surface->n_dof, PETSC_COMM_SELF, PETSC_ERR_PLIB, "the surfaces changed along a path");
   for (PetscInt k = 0; k < a->n_dof; k++) a->moved[k] = a->u_old[k] + step * a->du_old[parameter * a->n_dof + k];
-  PetscCall(
-      HycoContactTangentRows(f->fe_surface, &f->pairs, HycoFrictionSlip(f->friction)->row, a->moved, a->tangent, rows));
+  PetscCall(HycoContactTangentRows(f->fe_surface, &f->pairs, f->path->friction->row, a->moved, a->tangent, rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoSensitivityCoefficients(HycoSensitivityStep a, PetscReal mu[])
 {
   HycoFOM f = a->f;
-  const PetscInt *row = HycoFrictionSlip(f->friction)->row;
+  const PetscInt *row = f->path->friction->row;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < f->pairs.n; k++) {
@@ -263,7 +262,7 @@ PetscErrorCode HycoSensitivityCoefficients(HycoSensitivityStep a, PetscReal mu[]
 
 PetscErrorCode HycoSensitivitySpend(HycoSensitivityStep a, PetscInt parameter, Vec L, Vec w, Vec dL, Vec dw)
 {
-  const HycoSlip *s = HycoFrictionSlip(a->f->friction);
+  const HycoContactState s = a->f->path->friction;
   const PetscScalar *r, *g, *dr, *dg;
 
   PetscFunctionBegin;
@@ -358,7 +357,7 @@ PetscErrorCode HycoSensitivityAccept(HycoSensitivityStep a, const PetscReal mu[]
   PetscFunctionBegin;
   *smooth = PETSC_TRUE;
   if (f->path->flows) PetscCall(TakeStates(a, mu, d, U, dU, smooth));
-  if (!f->friction) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!f->path->friction) PetscFunctionReturn(PETSC_SUCCESS);
   changed[d->parameter] = PETSC_TRUE;
   moves = HycoSceneChanges(f->scene, changed).nodes;
   PetscCall(VecDuplicate(U, &V));
@@ -422,7 +421,7 @@ static PetscErrorCode ShowState(HycoSensitivityStep a, PetscInt parameter, Petsc
 PetscErrorCode HycoSensitivityView(HycoSensitivityStep a, PetscInt parameter, PetscReal step, Vec L, Vec dL)
 {
   HycoFOM f = a->f;
-  const HycoSlip *s = f->friction ? HycoFrictionSlip(f->friction) : NULL;
+  const HycoContactState s = f->path->friction;
   const PetscScalar *r, *dr;
 
   PetscFunctionBegin;
@@ -462,7 +461,7 @@ PetscErrorCode HycoSensitivityEnd(HycoSensitivityStep a)
     a->dstate0 = a->dstate;
     a->dstate = dstate;
   }
-  if (!f->friction) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!f->path->friction) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SurfaceDisplacements(a, f->U, a->u_old));
   a->du_old = a->du;
   a->du = du;

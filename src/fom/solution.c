@@ -8,7 +8,7 @@ static PetscErrorCode MeasureContacts(HycoFOM f, HycoSummary *s)
 {
   PetscReal sum[2] = {0, 0}, most[3] = {0, 0, 0};
   PetscInt n[2] = {0, 0};
-  HycoContactState state;
+  HycoContactFacts state;
 
   PetscFunctionBegin;
   /* Reads normals and gaps at the present parameters. */

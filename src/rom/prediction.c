@@ -95,7 +95,7 @@ static PetscErrorCode MeasureDisplacements(HycoROM m, HycoPrediction *p)
    since an RID cuts rows off, and on paths at each listed time. */
 static PetscErrorCode MeasureContacts(HycoROM m, HycoPrediction *p)
 {
-  HycoContactState state;
+  HycoContactFacts state;
 
   PetscFunctionBegin;
   PetscCall(HycoContactMeasure(m->fe, m->of_fe, m->U, m->Lambda, m->contact, m->model->facet, &state));

@@ -11,6 +11,7 @@ PetscErrorCode HycoTraceFree(HycoROM m)
 
   PetscFunctionBegin;
   m->pairs.shear = m->whole_pairs.shear = NULL;
+  m->friction = NULL;
   HycoFreeAll(&r->t, &r->gamma, &r->U_fe, &r->at, &r->loose, &r->Lambda, &r->sigma, &r->inelastic, &r->shear, &r->step);
   *r = empty;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -81,7 +82,7 @@ PetscErrorCode HycoTraceList(HycoROM m, PetscReal **sigma, PetscReal **inelastic
 PetscErrorCode HycoTraceMeasure(HycoROM m, HycoStep *s)
 {
   const PetscInt dim = m->fe->dim, *node;
-  HycoContactState state;
+  HycoContactFacts state;
   PetscInt n;
 
   PetscFunctionBegin;
@@ -135,6 +136,10 @@ PetscErrorCode HycoTraceRecord(HycoROM m, PetscBool linear, HycoFEState state, H
   PetscCall(PetscFree(mises));
   /* After the fields: the step's maxima belong to the same time. */
   PetscCall(HycoTraceMeasure(m, s));
+  if (!m->friction) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoContactStateMeasure(m->friction, s));
+  PetscCall(HycoTraceListShear(m, &m->friction->shear));
+  HycoTraceShow(m, m->trace.shown);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -182,7 +182,7 @@ static PetscErrorCode TakeForces(HycoReducer t, HycoSnapshots store, HycoBodiesF
         HycoSnapshotsReadRows(store, all + k / n_steps * n_par, k % n_steps, HycoSnapshotFriction[c], 0, n, component));
     for (PetscInt i = 0; i < n; i++) force[3 * i + c] = component[i];
   }
-  HycoSlipForces(HycoBodiesFrictionSlip(friction), normal, force, L);
+  HycoContactStateForces(HycoBodiesFrictionState(friction), normal, force, L);
   PetscCall(PetscFree2(component, force));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -10,7 +10,7 @@
 #include <hycoalgorithms.h>
 #include <hycogalerkintraining.h>
 #include <hycohybrid.h>
-#include <hycoslip.h>
+#include <hycocontactstate.h>
 #include <hycotrainers.h>
 
 #define WORST HYCO_JUDGED_WORST
@@ -350,7 +350,7 @@ static PetscErrorCode SearchFrom(HycoReducer t, HycoROM m, PetscInt start, Petsc
    where trials are cheap. */
 static PetscErrorCode ChooseRank(HycoReducer t, HycoROM m, Verdict *best)
 {
-  const PetscInt room = HycoSlipCountRows(t->scene, &m->model->pairs, m->model->mesh->dim),
+  const PetscInt room = HycoContactStateCountRows(t->scene, &m->model->pairs, m->model->mesh->dim),
                  starts = (PetscReal)t->n_s * (PetscReal)m->model->l < 1e4 ? 5 : 1;
   PetscInt n = 0, other = 0, *dof, *trial;
   Verdict verdict;
@@ -540,9 +540,9 @@ static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
 }
 
 /* The forces of column k by row of the contacts at fe's parameters: friction is stored as a vector. */
-static PetscErrorCode ReadRows(HycoReducer t, const HycoSlip *slip, PetscInt k, PetscReal force[], PetscReal S[])
+static PetscErrorCode ReadRows(HycoReducer t, HycoContactState state, PetscInt k, PetscReal force[], PetscReal S[])
 {
-  const PetscInt N = slip->n, steps = HycoSnapshotsSteps(t->scene);
+  const PetscInt N = state->n, steps = HycoSnapshotsSteps(t->scene);
   PetscReal *component;
   const PetscReal *mu;
   PetscInt n_par;
@@ -556,23 +556,22 @@ static PetscErrorCode ReadRows(HycoReducer t, const HycoSlip *slip, PetscInt k, 
     for (PetscInt i = 0; i < N; i++) force[3 * i + c] = component[i];
   }
   PetscCall(PetscFree(component));
-  HycoSlipForces(slip, t->Lambda + (size_t)k * (size_t)N, force, S);
+  HycoContactStateForces(state, t->Lambda + (size_t)k * (size_t)N, force, S);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* HycoReducerDualSnapshots() with tangential forces. */
-static PetscErrorCode FillRows(HycoReducer t, HycoROM m, HycoFE fe, HycoPairs *pairs, HycoSlip *slip)
+static PetscErrorCode FillRows(HycoReducer t, HycoROM m, HycoFE fe, HycoContactState state)
 {
   HycoHybridModel h = (HycoHybridModel)m->model->data;
-  const PetscInt N = pairs->n, n = slip->row[N];
-  PetscReal mu[HYCO_MAX_PARAMETERS], *force, *u;
+  const PetscInt N = state->n, n = state->row[N];
+  PetscReal mu[HYCO_MAX_PARAMETERS], *force;
   HycoRows rows = {0};
 
   PetscFunctionBegin;
   h->n_dual = 0;
   PetscCall(PetscMalloc1((size_t)n * (size_t)t->n_s + 1, &h->S_lambda));
   PetscCall(PetscMalloc1(3 * N, &force));
-  PetscCall(PetscCalloc1(fe->n_dof, &u));
   for (PetscInt k = 0; k < t->n_s; k++) {
     PetscReal size = 0;
 
@@ -580,25 +579,25 @@ static PetscErrorCode FillRows(HycoReducer t, HycoROM m, HycoFE fe, HycoPairs *p
     if (!(size > 0)) continue;
     PetscCall(HycoReducerColumn(t, k, mu));
     PetscCall(HycoFESetParameters(fe, mu));
-    PetscCall(HycoContactTangentRows(fe, pairs, slip->row, u, slip->tangent, &rows));
-    PetscCall(ReadRows(t, slip, k, force, h->S_lambda + (size_t)h->n_dual++ * (size_t)n));
+    PetscCall(HycoContactStateRows(state, fe, &rows)); /* the tangents */
+    PetscCall(ReadRows(t, state, k, force, h->S_lambda + (size_t)h->n_dual++ * (size_t)n));
   }
   PetscCall(HycoRowsDestroy(&rows));
-  HycoFreeAll(&force, &u);
+  PetscCall(PetscFree(force));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode FrictionSnapshots(HycoReducer t, HycoROM m)
 {
   HycoPairs pairs;
-  HycoSlip slip;
+  HycoContactState state;
   HycoFE fe;
 
   PetscFunctionBegin;
   PetscCall(HycoROMTakePairs(&m->model->pairs, &pairs));
   PetscCall(HycoFECreateSurface(t->scene, m->model->mesh->dm, &fe));
-  PetscCall(HycoSlipCreate(PETSC_COMM_SELF, t->scene, &pairs, fe->dim, &slip));
-  HycoFinally(FillRows(t, m, fe, &pairs, &slip), PetscCall(HycoSlipDestroy(&slip)); PetscCall(HycoFEDestroy(&fe));
+  PetscCall(HycoContactStateCreate(PETSC_COMM_SELF, t->scene, &pairs, fe->dim, &state));
+  HycoFinally(FillRows(t, m, fe, state), PetscCall(HycoContactStateDestroy(&state)); PetscCall(HycoFEDestroy(&fe));
               PetscCall(HycoROMDropPairs(&pairs)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -22,13 +22,13 @@
 static PetscErrorCode CreateSurface(HycoBodiesFriction f)
 {
   const HycoPairs *pairs = f->normal.pairs;
-  const PetscInt n = f->slip.row[f->slip.n];
+  const PetscInt n = f->state->row[f->state->n];
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n + 1, &f->contact));
   for (PetscInt k = 0; k < pairs->n; k++) {
     /* Every row of a contact has its scene entry: the gap and the normal are found by it. */
-    for (PetscInt r = f->slip.row[k]; r < f->slip.row[k + 1]; r++) f->contact[r] = pairs->contact[k];
+    for (PetscInt r = f->state->row[k]; r < f->state->row[k + 1]; r++) f->contact[r] = pairs->contact[k];
   }
   f->all = (HycoBodiesSurface){f->normal.fe, f->normal.pairs, &f->rows, n, f->contact};
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -47,15 +47,12 @@ PetscErrorCode HycoBodiesFrictionCreate(HycoScene scene, const HycoBodiesSurface
   f = *friction;
   f->normal = *surface;
   f->p = p;
-  PetscCall(HycoSlipCreate(PETSC_COMM_SELF, scene, surface->pairs, surface->fe->dim, &f->slip));
+  PetscCall(HycoContactStateCreate(PETSC_COMM_SELF, scene, surface->pairs, surface->fe->dim, &f->state));
   /* Rows of normals and tangents, whose number fixes the sizes below. */
   PetscCall(CreateSurface(f));
   n = p + f->all.n;
   PetscCall(PetscCalloc1(surface->fe->n_dof, &f->U));
-  PetscCall(PetscCalloc1(surface->fe->n_dof, &f->U_old));
   PetscCall(PetscCalloc1(n + 1, &f->w));
-  PetscCall(PetscCalloc1(n + 1, &f->forces));
-  PetscCall(PetscCalloc1(n + 1, &f->before));
   PetscCall(PetscCalloc1(n + 1, &f->q));
   PetscCall(PetscCalloc1(n + 1, &f->z));
   PetscCall(PetscCalloc1(n + 1, &f->ahead));
@@ -74,10 +71,10 @@ PetscErrorCode HycoBodiesFrictionDestroy(HycoBodiesFriction *friction)
   PetscCall(HycoTaoDestroy(&f->tao));
   PetscCall(HycoConeFactorDestroy(&f->factor));
   PetscCall(HycoBlocksDestroy(&f->blocks)); /* before the cones, which they refer to */
-  PetscCall(HycoSlipDestroy(&f->slip));
+  PetscCall(HycoContactStateDestroy(&f->state));
   PetscCall(HycoRowsDestroy(&f->rows));
-  HycoFreeAll(&f->contact, &f->M, &f->weights_of, &f->kappa_of, &f->pieces, &f->q, &f->z, &f->ahead, &f->U, &f->U_old,
-              &f->w, &f->forces, &f->before, &f->taken, friction);
+  HycoFreeAll(&f->contact, &f->M, &f->weights_of, &f->kappa_of, &f->pieces, &f->q, &f->z, &f->ahead, &f->U, &f->w,
+              &f->taken, friction);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -87,14 +84,11 @@ const HycoBodiesSurface *HycoBodiesFrictionSurface(HycoBodiesFriction f)
   return &f->all;
 }
 
-/* U_old = 0 is the unloaded state, from which the first step measures slip. W depends on the parameters through the
-   bodies' weights and poses, but not on time. */
+/* W depends on the parameters through the bodies' weights and poses, but not on time. */
 PetscErrorCode HycoBodiesFrictionBegin(HycoBodiesFriction f)
 {
   PetscFunctionBegin;
-  PetscCall(HycoSlipBegin(&f->slip));
-  PetscCall(PetscArrayzero(f->U_old, f->normal.fe->n_dof));
-  PetscCall(PetscArrayzero(f->forces, f->all.n));
+  PetscCall(HycoContactStateBegin(f->state));
   f->n_taken = 0;
   f->present = f->loose = f->unloaded_body = PETSC_FALSE;
   HycoConeFactorForget(f->factor); /* a path does not depend on those before */
@@ -149,15 +143,11 @@ static PetscErrorCode BodiesFrictionCondense(HycoBodiesFriction f, HycoBodiesWor
 /* Called for each step, as gaps and coefficients of friction change in time. */
 PetscErrorCode HycoBodiesFrictionPrepare(HycoBodiesFriction f, HycoBodiesWork o, const PetscReal mu[])
 {
-  const HycoBodiesSurface *s = &f->normal;
-
   PetscFunctionBegin;
-  PetscCall(HycoSlipCoefficients(&f->slip, s->fe, s->pairs));
-  /* Tangents' gaps are B_t U_old, so that D - B U is the slip of the step. */
-  PetscCall(HycoContactTangentRows(s->fe, s->pairs, f->slip.row, f->U_old, f->slip.tangent, &f->rows));
+  PetscCall(HycoContactStateRows(f->state, f->normal.fe, &f->rows));
   PetscCall(HycoBodiesPrepare(o, &f->all, mu));
   PetscCall(HycoBlocksDestroy(&f->blocks)); /* of other coefficients */
-  PetscCall(HycoBlocksCreate(2, f->slip.cone, f->slip.n, f->slip.of, f->slip.data, &f->blocks));
+  PetscCall(HycoBlocksCreate(2, f->state->cone, f->state->n, f->state->of, f->state->data, &f->blocks));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -210,12 +200,14 @@ static PetscErrorCode BodiesFrictionLeastSlip(HycoBodiesFriction f)
 {
   const PetscInt n = f->all.n, p = f->p, last = (f->n_taken - 1) * (p + n);
   PetscReal *A, *w, *move, *x, *first;
-  PetscBool smooth = (PetscBool)!HycoSlipHasFriction(&f->slip);
+  PetscBool smooth;
   PetscInt loose;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < f->slip.n && !smooth; k++)
-    smooth = (PetscBool)(!(f->slip.mu[k] > 0) && f->z[p + f->slip.row[k]] > 0);
+  PetscCall(HycoContactStateHasFriction(f->state, &smooth));
+  smooth = (PetscBool)!smooth;
+  for (PetscInt k = 0; k < f->state->n && !smooth; k++)
+    smooth = (PetscBool)(!(f->state->mu[k] > 0) && f->z[p + f->state->row[k]] > 0);
   if (!p || !smooth) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc5(p * n, &A, p + n, &w, p, &move, p, &x, p, &first));
   MotionRows(f, A);
@@ -248,6 +240,8 @@ PetscErrorCode HycoBodiesFrictionSolveContact(HycoBodiesFriction f, HycoBodiesWo
                  .warm = PETSC_TRUE,
                  .given = PETSC_TRUE};
 
+  PetscBool has;
+
   PetscFunctionBegin;
   if (!f->present) PetscCall(BodiesFrictionCondense(f, o));
   lcp.M = f->M;
@@ -256,8 +250,9 @@ PetscErrorCode HycoBodiesFrictionSolveContact(HycoBodiesFriction f, HycoBodiesWo
   PetscCall(PetscArraycpy(f->q + p, o->gap, n));
   if (!again) {
     PetscCall(PetscArrayzero(f->z, p));
-    PetscCall(PetscArraycpy(f->z + p, f->forces, n)); /* a step that was refused leaves no trace */
-    if (HycoSlipExtrapolate(&f->slip, t, n, f->forces, f->before, f->ahead + p)) lcp.other = f->ahead;
+    PetscCall(HycoVecRead(f->state->L, n, f->z + p)); /* a step that was refused leaves no trace */
+    PetscCall(HycoContactStateExtrapolate(f->state, t, f->ahead + p, &has));
+    if (has) lcp.other = f->ahead;
   }
   PetscCall(HycoTaoSolveLCP(f->tao, &lcp, NULL, f->z, its, solved));
   PetscCall(HycoBlocksAdmit(f->blocks, f->z + p)); /* inadmissible by round-off; residuals are recomputed */
@@ -309,7 +304,7 @@ PetscErrorCode HycoBodiesFrictionProbe(HycoBodiesFriction f, HycoBodiesWork o, c
   PetscCall(HycoBodiesFrictionMove(f, o, &kkt));
   PetscCall(PetscArraycpy(w, f->w, f->all.n));
   /* The forces of the tangents, for the results of the contacts. */
-  HycoSlipAdd(&f->slip, f->z + f->p, f->w, f->most);
+  HycoContactStateAddSlips(f->state, f->z + f->p, f->w, f->most);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -443,8 +438,9 @@ PetscErrorCode HycoBodiesFrictionDerive(HycoBodiesFriction f, PetscInt m, const 
   PetscCall(PetscFree(f->pieces));
   HycoDuplicate(n_pieces + 1, pieces, &f->pieces);
   *n_set = 0;
-  for (PetscInt k = 0; k < f->slip.n; k++) {
-    for (PetscInt i = f->slip.row[k]; i < f->slip.row[k + 1] && f->z[p + f->slip.row[k]] > 0; i++) set[(*n_set)++] = i;
+  for (PetscInt k = 0; k < f->state->n; k++) {
+    for (PetscInt i = f->state->row[k]; i < f->state->row[k + 1] && f->z[p + f->state->row[k]] > 0; i++)
+      set[(*n_set)++] = i;
   }
   PetscCall(PetscFree(*Z));
   PetscCall(PetscMalloc1(*n_set * m + 1, Z));
@@ -469,7 +465,7 @@ static PetscErrorCode FindFreeMotions(HycoBodiesFriction f, HycoBodiesWork o, Pe
 
   PetscFunctionBegin;
   if (!p) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt k = 0; k < f->slip.n; k++) most = PetscMax(most, L[f->slip.row[k]]);
+  for (PetscInt k = 0; k < f->state->n; k++) most = PetscMax(most, L[f->state->row[k]]);
   f->unloaded_body = (PetscBool)(!(most > 0) && (f->unloaded_body || HycoBodiesLoaded(o)));
   if (!(most > 0)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc2(p * f->all.n, &A, p, &first));
@@ -494,7 +490,6 @@ PetscBool HycoBodiesFrictionFreeMotion(HycoBodiesFriction f, char name[HYCO_LINE
 /* Slip, forces and displacements change here only, so that a halved step repeats from the same state. */
 PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction f, HycoBodiesWork o, PetscReal t)
 {
-  const PetscReal *L = f->z + f->p;
   const size_t n = (size_t)(f->p + f->all.n);
 
   PetscFunctionBegin;
@@ -504,25 +499,20 @@ PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction f, HycoBodiesWork o, 
     PetscCall(PetscRealloc((size_t)f->room * n * sizeof(PetscReal) + 1, &f->taken));
   }
   PetscCall(PetscArraycpy(f->taken + (size_t)f->n_taken++ * n, f->z, n));
-  HycoSlipAdd(&f->slip, L, f->w, f->most);
-  /* The last two accepted forces, in this order: the next step extrapolates from them. */
-  PetscCall(PetscArraycpy(f->before, f->forces, f->all.n));
-  PetscCall(PetscArraycpy(f->forces, L, f->all.n));
-  HycoSlipTake(&f->slip, t);
-  PetscCall(PetscArraycpy(f->U_old, f->U, f->normal.fe->n_dof));
+  PetscCall(HycoContactStateAccept(f->state, t, f->z + f->p, f->w, f->most, f->U));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The first row of each contact is its normal one. */
 void HycoBodiesFrictionNormal(HycoBodiesFriction f, PetscReal Lambda[])
 {
-  for (PetscInt k = 0; k < f->slip.n; k++) Lambda[k] = f->z[f->p + f->slip.row[k]];
+  for (PetscInt k = 0; k < f->state->n; k++) Lambda[k] = f->z[f->p + f->state->row[k]];
 }
 
 /* Borrowed, for outputs and fields: slip, states and work since the path began. */
-const HycoSlip *HycoBodiesFrictionSlip(HycoBodiesFriction f)
+HycoContactState HycoBodiesFrictionState(HycoBodiesFriction f)
 {
-  return &f->slip;
+  return f->state;
 }
 
 /* Of the solution that is accepted; needs a factor, which the next step begins with. */

@@ -7,7 +7,7 @@
 
 typedef struct _n_HycoBodiesSensitivity *HycoBodiesSensitivity;
 struct _n_HycoBodiesFriction {
-  HycoSlip slip;
+  HycoContactState state;
   HycoBodiesSurface normal, all; /* without and with tangents */
   HycoRows rows;
   PetscInt *contact; /* by row: of the scene */
@@ -21,9 +21,7 @@ struct _n_HycoBodiesFriction {
   PetscReal *kappa_of;           /* and stiffness that it belongs to */
   PetscReal *q, *z, *ahead;      /* p + rows: of the step; its motions and forces; a start of it */
   PetscReal *pieces;             /* of the laws, when the derivative of the forces was taken */
-  PetscReal *before;             /* by row: forces of the accepted step before the last one */
-  PetscReal *U, *U_old;          /* n_dof: of the surface, at the step and at the last accepted time */
-  PetscReal *w, *forces;         /* by row: of the last accepted step */
+  PetscReal *U, *w;              /* n_dof: of the surface at the step; by row */
   PetscReal most;                /* largest displacement */
   PetscInt n_taken, room;        /* accepted steps, and room for them */
   PetscBool loose;               /* an accepted state with forces left a motion free */

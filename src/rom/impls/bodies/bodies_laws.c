@@ -70,7 +70,7 @@ PetscErrorCode HycoBodiesLawsRecord(HycoROM m, const PetscReal alpha[])
   PetscCall(PetscArraycpy(to, alpha, l));
   if (w->friction) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscArraycpy(to + l, w->bodies.x, p));
-  PetscCall(HycoVecRead(w->path->Lambda, w->surface.n, to + l + p));
+  PetscCall(HycoVecRead(w->path->contact.Lambda, w->surface.n, to + l + p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -76,7 +76,7 @@ static PetscErrorCode BodiesPathIterate(HycoPath p, PetscReal t0, PetscReal t1, 
 
   PetscFunctionBegin;
   PetscCall(VecGetArray(p->U, &alpha));
-  PetscCall(VecGetArray(p->Lambda, &L));
+  PetscCall(VecGetArray(p->contact.Lambda, &L));
   /* The option tangent renews in each iteration from the first one on. */
   w->always = (PetscBool)(p->method == HYCO_NEWTON_TANGENT);
   PetscCall(HycoBodiesSearch(m, t0, t1, alpha, L, a));
@@ -85,7 +85,7 @@ static PetscErrorCode BodiesPathIterate(HycoPath p, PetscReal t0, PetscReal t1, 
   if (a->why[0] && !w->always && (w->n_rows || !w->friction)) { /* again from the begin of the step */
     /* alpha and the forces of the last accepted time. */
     PetscCall(HycoVecRead(p->U_old, p->n_free, alpha));
-    PetscCall(HycoVecRead(p->L_old, p->n_contacts, L));
+    PetscCall(HycoVecRead(p->contact.L_old, p->n_contacts, L));
     a->why[0] = '\0';
     a->iterations = 0;
     w->always = PETSC_TRUE;
@@ -93,7 +93,7 @@ static PetscErrorCode BodiesPathIterate(HycoPath p, PetscReal t0, PetscReal t1, 
   }
   if (!a->why[0]) PetscCall(BodiesPathState(m, t0, t1, alpha, L, a));
   PetscCall(VecRestoreArray(p->U, &alpha));
-  PetscCall(VecRestoreArray(p->Lambda, &L));
+  PetscCall(VecRestoreArray(p->contact.Lambda, &L));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -186,22 +186,7 @@ static PetscReal BodiesPathMisfit(HycoROM m, const PetscReal alpha[])
   return size > 0 ? PetscSqrtReal(rest / size) : 0;
 }
 
-/* The state of the contacts at a listed time. Work and number of slipping contacts are sums since the begin of the
-   path. */
-static PetscErrorCode RecordFriction(HycoROM m, HycoStep *s)
-{
-  const HycoSlip *slip = HycoBodiesFrictionSlip(((HycoBodiesPath)m->work)->friction);
-  PetscReal sum[2];
-
-  PetscFunctionBegin;
-  HycoSlipSum(slip, sum);
-  s->friction_work = sum[0];
-  s->n_slipping = (PetscInt)sum[1];
-  PetscCall(HycoTraceListShear(m, &slip->shear));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The same at the last accepted time: the work may have a step that was refused. */
+/* The displacements at the last accepted time: the work may have a step that was refused. */
 static void MoveBack(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -223,7 +208,7 @@ static PetscErrorCode BodiesPathRecord(HycoPath p)
   PetscBool *loose;
 
   PetscFunctionBegin;
-  PetscCall(HycoVecRead(p->Lambda, m->model->pairs.n, m->Lambda));
+  PetscCall(HycoVecRead(p->contact.Lambda, m->model->pairs.n, m->Lambda));
   PetscCall(HycoROMExpandModal(m));
   /* Exact displacements of surfaces and cells over those of the modes, in this order. */
   MoveBack(m);
@@ -234,7 +219,6 @@ static PetscErrorCode BodiesPathRecord(HycoPath p)
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
   PetscCall(HycoTraceRecord(m, PETSC_TRUE, p->begin, &p->now));
   m->imbalance = PetscMax(m->imbalance, HycoBodiesImbalance(&w->bodies, PETSC_FALSE));
-  if (w->friction) PetscCall(RecordFriction(m, &p->now));
   loose = &m->trace.loose[m->trace.n_listed - 1];
   if (w->friction)
     *loose = HycoBodiesFrictionFreeMotion(w->friction, m->loose);
@@ -251,7 +235,7 @@ static PetscErrorCode BodiesPathRecord(HycoPath p)
   }
   m->prediction.loose = (PetscBool)(m->prediction.loose || *loose);
   PetscCall(HycoRowsCountDependent(rows, m->fe->n_dof, m->U, m->Lambda,
-                                   w->friction ? HycoBodiesFrictionSlip(w->friction) : NULL, &p->now.n_dependent));
+                                   w->friction ? HycoBodiesFrictionState(w->friction) : NULL, &p->now.n_dependent));
   PetscCall(PetscArraycpy(w->motions + p->n_steps * w->bodies.bodies->p, w->bodies.x, w->bodies.bodies->p));
   p->steps[p->n_steps++] = p->now;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
@@ -312,7 +296,7 @@ static PetscErrorCode BodiesPathResidual(HycoROM m, const PetscReal mu[], const 
   PetscCall(ProbeCells(m, z + p + o->surface.n, z + p));
   HycoBodiesWorkOnMotions(&o->bodies, w);
   HycoBodiesFrictionNormal(o->friction, m->Lambda);
-  HycoTraceShowOther(m, &HycoBodiesFrictionSlip(o->friction)->shear);
+  HycoTraceShowOther(m, &HycoBodiesFrictionState(o->friction)->shear);
   *size = 0; /* it is for differences, which programs do not take */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -546,7 +530,7 @@ static PetscErrorCode CreatePath(HycoROM m)
   /* The driver copies and restores U and Lambda when a step is refused: they must be all of the state but that of the
      laws. */
   p->U = w->alpha;
-  p->Lambda = w->L;
+  p->contact.Lambda = w->L;
   p->n_contacts = m->model->pairs.n;
   p->n_free = w->bodies.bodies->inelastic->m;
   PetscCall(HycoPathSetUp(p));
@@ -569,6 +553,7 @@ static PetscErrorCode SetUp(HycoROM m)
   if (HycoSceneHasFriction(m->model->scene)) {
     PetscCall(HycoBodiesFrictionCreate(m->model->scene, &w->surface, w->bodies.bodies->p, &w->friction));
     w->surface = *HycoBodiesFrictionSurface(w->friction);
+    m->friction = HycoBodiesFrictionState(w->friction);
   }
   w->gaps = w->friction ? 0 : w->surface.n;
   PetscCall(HycoBodiesSetUp(&w->bodies, w->bodies.bodies, m->model->scene, &w->surface, m->solver));

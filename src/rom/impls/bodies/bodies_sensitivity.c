@@ -45,18 +45,18 @@ static PetscErrorCode BodiesTangentMake(HycoBodiesFriction f)
   if (f->along) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&f->along));
   a = f->along;
-  PetscCall(PetscMalloc1(6 * f->slip.n + 1, &a->tangent));
-  PetscCall(PetscMalloc1(5 * f->slip.n + 1, &a->mu));
+  PetscCall(PetscMalloc1(6 * f->state->n + 1, &a->tangent));
+  PetscCall(PetscMalloc1(5 * f->state->n + 1, &a->mu));
   PetscCall(PetscCalloc1(PetscMax(f->normal.fe->n_dof, n), &a->none));
   PetscCall(PetscMalloc1(n + 1, &a->old));
   PetscCall(PetscMalloc1(n + 1, &a->gap));
   PetscCall(PetscMalloc1(parameters * n + 1, &a->slip));
-  PetscCall(PetscMalloc1(parameters * f->slip.n + 1, &a->work));
+  PetscCall(PetscMalloc1(parameters * f->state->n + 1, &a->work));
   PetscCall(PetscCalloc1(N + 1, &a->slack));
   PetscCall(PetscMalloc1(N + 1, &a->q));
   PetscCall(PetscMalloc1(N + 1, &a->w));
-  PetscCall(PetscMalloc1(3 * f->slip.n + 1, &a->force));
-  PetscCall(PetscMalloc1(f->slip.n + 1, &a->spent));
+  PetscCall(PetscMalloc1(3 * f->state->n + 1, &a->force));
+  PetscCall(PetscMalloc1(f->state->n + 1, &a->spent));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -65,15 +65,15 @@ static void TakeOld(HycoBodiesFriction f)
 {
   HycoBodiesSensitivity a = f->along;
 
-  for (PetscInt k = 0; k < f->slip.n; k++) {
+  for (PetscInt k = 0; k < f->state->n; k++) {
     PetscReal jump[3];
 
-    HycoPairsJump(f->normal.pairs, k, f->slip.dim, f->U_old, jump);
-    for (PetscInt r = f->slip.row[k]; r < f->slip.row[k + 1]; r++) {
-      const PetscReal *along = f->slip.tangent + 6 * k + 3 * (r - f->slip.row[k] - 1);
+    HycoPairsJump(f->normal.pairs, k, f->state->dim, f->state->u_old, jump);
+    for (PetscInt r = f->state->row[k]; r < f->state->row[k + 1]; r++) {
+      const PetscReal *along = f->state->tangent + 6 * k + 3 * (r - f->state->row[k] - 1);
 
       a->old[r] = 0;
-      if (r > f->slip.row[k] && !HycoPairsAlone(f->normal.fe->scene, f->normal.pairs, k))
+      if (r > f->state->row[k] && !HycoPairsAlone(f->normal.fe->scene, f->normal.pairs, k))
         a->old[r] = jump[0] * along[0] + jump[1] * along[1] + jump[2] * along[2];
       a->gap[r] = f->rows.gap[r] - a->old[r];
     }
@@ -116,11 +116,11 @@ PetscErrorCode HycoBodiesSensitivityLinearise(HycoROM m, HycoBodiesFriction f, H
   if (!*able || k < 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(BodiesTangentMake(f));
   if (k) {
-    PetscCall(PetscArraycpy(f->U_old, f->U, f->normal.fe->n_dof));
+    PetscCall(PetscArraycpy(f->state->u_old, f->U, f->normal.fe->n_dof));
   } else {
-    PetscCall(PetscArrayzero(f->U_old, f->normal.fe->n_dof));
+    PetscCall(PetscArrayzero(f->state->u_old, f->normal.fe->n_dof));
     PetscCall(PetscArrayzero(f->along->slip, parameters * n));
-    PetscCall(PetscArrayzero(f->along->work, parameters * f->slip.n));
+    PetscCall(PetscArrayzero(f->along->work, parameters * f->state->n));
   }
   PetscCall(HycoBodiesFrictionPrepare(f, o, m->fe->mu));
   PetscCall(BodiesTangentFind(f, o, taken, alpha, able));
@@ -135,7 +135,7 @@ void HycoBodiesSensitivityResidual(HycoBodiesFriction f, const PetscInt **row, P
 {
   HycoBodiesSensitivity a = f->along;
 
-  *row = f->slip.row;
+  *row = f->state->row;
   *size = f->most;
   for (PetscInt r = 0; r < f->all.n; r++) {
     w[r] = f->w[r] - a->old[r];
@@ -150,7 +150,7 @@ static PetscErrorCode TangentRows(HycoROM m, HycoBodiesFriction f)
   HycoBodiesSensitivity a = f->along;
 
   PetscFunctionBegin;
-  PetscCall(HycoContactTangentRows(m->fe, &m->pairs, f->slip.row, a->none, a->tangent, &a->rows));
+  PetscCall(HycoContactTangentRows(m->fe, &m->pairs, f->state->row, a->none, a->tangent, &a->rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -170,9 +170,9 @@ PetscErrorCode HycoBodiesSensitivityPerturbed(HycoROM m, HycoBodiesFriction f, c
     s.pairs = &m->pairs;
     s.rows = &a->rows;
   }
-  for (PetscInt k = 0; k < f->slip.n; k++) {
+  for (PetscInt k = 0; k < f->state->n; k++) {
     HycoExpr friction = m->model->scene->contact[m->pairs.contact[k]]->friction;
-    PetscReal *at = a->mu + point * f->slip.n + k;
+    PetscReal *at = a->mu + point * f->state->n + k;
 
     *at = 0;
     if (friction) PetscCall(HycoExprEval(friction, mu, 1, m->fe->X + 3 * m->pairs.slave[k], at));
@@ -194,9 +194,9 @@ PetscErrorCode HycoBodiesSensitivityAdvance(HycoBodiesFriction f, PetscInt param
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(a->q, q, p + n));
   for (PetscInt i = 0; i < n; i++) a->q[p + i] += a->slip[parameter * n + i];
-  for (PetscInt k = 0; k < f->slip.n; k++) {
-    dmu[k] = weight[0] * f->slip.mu[k];
-    for (PetscInt j = 1; j < 3; j++) dmu[k] += weight[j] * a->mu[point[j] * f->slip.n + k];
+  for (PetscInt k = 0; k < f->state->n; k++) {
+    dmu[k] = weight[0] * f->state->mu[k];
+    for (PetscInt j = 1; j < 3; j++) dmu[k] += weight[j] * a->mu[point[j] * f->state->n + k];
   }
   PetscCall(HycoConeTangent(&lcp, a->before, f->z, a->slack, a->size, dmu, a->q, dz, a->w, regular));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -207,13 +207,13 @@ void HycoBodiesSensitivityAccept(HycoBodiesFriction f, PetscInt parameter, const
   HycoBodiesSensitivity a = f->along;
   const PetscInt n = f->all.n, p = f->p;
   const PetscReal *r = f->z + p;
-  PetscReal *slip = a->slip + parameter * n, *work = a->work + parameter * f->slip.n;
+  PetscReal *slip = a->slip + parameter * n, *work = a->work + parameter * f->state->n;
 
-  for (PetscInt k = 0; k < f->slip.n; k++) {
-    const PetscInt first = f->slip.row[k];
+  for (PetscInt k = 0; k < f->state->n; k++) {
+    const PetscInt first = f->state->row[k];
 
     if (f->rows.start[first] == f->rows.start[first + 1]) continue;
-    for (PetscInt i = first + 1; i < f->slip.row[k + 1]; i++) {
+    for (PetscInt i = first + 1; i < f->state->row[k + 1]; i++) {
       if (r[first] > 0) work[k] -= dz[p + i] * f->w[i] + r[i] * a->w[p + i];
       slip[i] -= a->w[p + i];
     }
@@ -224,16 +224,16 @@ PetscErrorCode HycoBodiesSensitivityView(HycoROM m, HycoBodiesFriction f, PetscI
                                          PetscReal step, const PetscReal dz[])
 {
   HycoBodiesSensitivity a = f->along;
-  const PetscReal *work = a->work + parameter * f->slip.n, *tangent = rows ? a->tangent : f->slip.tangent;
+  const PetscReal *work = a->work + parameter * f->state->n, *tangent = rows ? a->tangent : f->state->tangent;
   HycoShear shear = m->trace.seen;
 
   PetscFunctionBegin;
   if (rows) PetscCall(TangentRows(m, f));
-  for (PetscInt k = 0; k < f->slip.n; k++) {
-    const PetscInt first = f->slip.row[k];
+  for (PetscInt k = 0; k < f->state->n; k++) {
+    const PetscInt first = f->state->row[k];
 
     for (PetscInt c = 0; c < 3; c++) a->force[3 * k + c] = 0;
-    for (PetscInt i = f->p + first + 1; i < f->p + f->slip.row[k + 1]; i++) {
+    for (PetscInt i = f->p + first + 1; i < f->p + f->state->row[k + 1]; i++) {
       for (PetscInt c = 0; c < 3; c++)
         a->force[3 * k + c] -= (f->z[i] + step * dz[i]) * tangent[6 * k + 3 * (i - f->p - first - 1) + c];
     }

@@ -12,34 +12,26 @@
 #include <hycocoulomb.h>
 #include <hycogalerkin.h>
 #include <hycopath.h>
-#include <hycoslip.h>
 
+/* Of all contacts of the scene, on the model's mesh; those of A_lambda are the path's. */
 struct _n_HycoGalerkinFriction {
-  HycoSlip own, all;        /* the contacts of A_lambda on fe; those of the scene on the model's mesh */
-  HycoRows rows;            /* of all contacts, with tangents */
-  PetscReal *force, *slack; /* by row of all contacts: of the last accepted time */
-  PetscReal *last, *before; /* n_L: multipliers of the last two accepted times */
-  PetscReal *U_old;         /* of the model's mesh, at the last accepted time */
-  Vec ahead;                /* n_L: another start of a step */
+  HycoContactState all;
+  HycoRows rows;            /* with tangents */
+  PetscReal *force, *slack; /* by row: of the last accepted time */
 };
 
-/* Once the contacts of A_lambda are known; sets their rows in own_rows, and n_L. */
+/* Once the contacts of A_lambda are known. */
 PetscErrorCode HycoGalerkinFrictionCreate(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
-  const PetscInt dim = m->model->mesh->dim;
   HycoGalerkinFriction f;
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&g->friction));
   f = g->friction;
-  PetscCall(HycoSlipCreate(PETSC_COMM_SELF, m->model->scene, &g->own_pairs, dim, &f->own));
-  PetscCall(HycoSlipCreate(PETSC_COMM_SELF, m->model->scene, &m->pairs, dim, &f->all));
-  m->n_L = f->own.row[m->m];
-  PetscCall(PetscCalloc2(f->all.row[m->pairs.n], &f->force, f->all.row[m->pairs.n], &f->slack));
-  PetscCall(PetscCalloc2(m->n_L, &f->last, m->n_L, &f->before));
-  PetscCall(PetscCalloc1(m->model->mesh->n_nodes * dim, &f->U_old));
-  PetscCall(VecCreateSeq(PETSC_COMM_SELF, m->n_L, &f->ahead));
+  PetscCall(HycoContactStateCreate(PETSC_COMM_SELF, m->model->scene, &m->pairs, m->model->mesh->dim, &f->all));
+  m->n_L = HycoContactStateCountRows(m->model->scene, &g->own_pairs, m->model->mesh->dim);
+  PetscCall(PetscCalloc2(f->all->row[m->pairs.n], &f->force, f->all->row[m->pairs.n], &f->slack));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -50,25 +42,22 @@ PetscErrorCode HycoGalerkinFrictionDestroy(HycoGalerkinFriction *friction)
 
   PetscFunctionBegin;
   if (!f) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoSlipDestroy(&f->own));
-  PetscCall(HycoSlipDestroy(&f->all));
+  PetscCall(HycoContactStateDestroy(&f->all));
   PetscCall(HycoRowsDestroy(&f->rows));
   PetscCall(PetscFree2(f->force, f->slack));
-  PetscCall(PetscFree2(f->last, f->before));
-  PetscCall(VecDestroy(&f->ahead));
-  HycoFreeAll(&f->U_old, friction);
+  PetscCall(PetscFree(*friction));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* By number in A_lambda: a row is a contact without friction. */
 PetscInt HycoGalerkinFirstRow(HycoGalerkin g, PetscInt k)
 {
-  return g->friction ? g->friction->own.row[k] : k;
+  return g->friction ? g->state->row[k] : k;
 }
 
 PetscInt HycoGalerkinContactOf(HycoGalerkin g, PetscInt row)
 {
-  PetscInt k = g->friction ? PetscMin(row, g->friction->own.n - 1) : row; /* a contact has a row at least */
+  PetscInt k = g->friction ? PetscMin(row, g->own_pairs.n - 1) : row; /* a contact has a row at least */
 
   while (HycoGalerkinFirstRow(g, k) > row) k--;
   return k;
@@ -78,7 +67,7 @@ PetscInt HycoGalerkinContactOf(HycoGalerkin g, PetscInt row)
 const PetscInt *HycoGalerkinFrictionForces(HycoGalerkinFriction f, PetscReal **force)
 {
   *force = f->force;
-  return f->all.row;
+  return f->all->row;
 }
 
 /* The path starts from bodies at rest. */
@@ -87,12 +76,9 @@ PetscErrorCode HycoGalerkinFrictionBegin(HycoROM m)
   HycoGalerkinFriction f = ((HycoGalerkin)m->work)->friction;
 
   PetscFunctionBegin;
-  PetscCall(HycoSlipBegin(&f->own));
-  PetscCall(HycoSlipBegin(&f->all));
-  PetscCall(PetscArrayzero(f->force, f->all.row[f->all.n]));
-  PetscCall(PetscArrayzero(f->last, m->n_L));
-  PetscCall(PetscArrayzero(f->before, m->n_L));
-  PetscCall(PetscArrayzero(f->U_old, m->model->mesh->n_nodes * m->model->mesh->dim));
+  m->friction = f->all;
+  PetscCall(HycoContactStateBegin(f->all));
+  PetscCall(PetscArrayzero(f->force, f->all->row[f->all->n]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -116,19 +102,18 @@ static PetscErrorCode IsTested(HycoGalerkin g, PetscInt begin, PetscInt end, Pet
 PetscErrorCode HycoGalerkinFrictionRows(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
-  HycoGalerkinFriction f = g->friction;
+  const HycoContactState own = g->state;
   HycoRows *rows = &g->own_rows;
   PetscInt n = 0, begin = 0;
 
   PetscFunctionBegin;
-  PetscCall(HycoSlipCoefficients(&f->own, m->fe, &g->own_pairs));
-  PetscCall(HycoContactTangentRows(m->fe, &g->own_pairs, f->own.row, f->U_old, f->own.tangent, rows));
+  PetscCall(HycoContactStateRows(own, m->fe, rows));
   for (PetscInt k = 0; k < m->m; k++) {
-    for (PetscInt r = f->own.row[k]; r < f->own.row[k + 1]; r++) {
+    for (PetscInt r = own->row[k]; r < own->row[k + 1]; r++) {
       const PetscInt end = rows->start[r + 1];
       PetscBool tested = PETSC_TRUE;
 
-      if (r > f->own.row[k]) PetscCall(IsTested(g, begin, end, &tested));
+      if (r > own->row[k]) PetscCall(IsTested(g, begin, end, &tested));
       for (PetscInt e = begin; e < end && tested; e++, n++) {
         rows->dof[n] = rows->dof[e];
         rows->value[n] = rows->value[e];
@@ -141,38 +126,23 @@ PetscErrorCode HycoGalerkinFrictionRows(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cones with the coefficients of the step, and its other start. */
-PetscErrorCode HycoGalerkinFrictionSetCones(HycoROM m)
-{
-  HycoGalerkin g = (HycoGalerkin)m->work;
-  HycoGalerkinFriction f = g->friction;
-  PetscScalar *ahead;
-  PetscBool has;
-
-  PetscFunctionBegin;
-  if (!m->n_L) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoSystemSetBlocks(g->system, 2, f->own.cone, m->m, f->own.of, f->own.data));
-  PetscCall(VecGetArrayWrite(f->ahead, &ahead));
-  /* The time stands after the parameters, among the variables of expressions. */
-  has = HycoSlipExtrapolate(&f->own, m->fe->mu[m->model->scene->n_parameters], m->n_L, f->last, f->before, ahead);
-  PetscCall(VecRestoreArrayWrite(f->ahead, &ahead));
-  PetscCall(HycoSolverSetOtherStart(m->solver, has ? f->ahead : NULL));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Multipliers by row of all contacts; forces elsewhere are zero. */
 static PetscErrorCode TakeMultipliers(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
   HycoGalerkinFriction f = g->friction;
+  const PetscScalar *L;
 
   PetscFunctionBegin;
-  PetscCall(PetscArrayzero(f->force, f->all.row[f->all.n]));
-  PetscCall(PetscArraycpy(f->before, f->last, m->n_L));
-  if (m->n_L) PetscCall(HycoVecRead(g->L, m->n_L, f->last));
-  for (PetscInt k = 0; k < m->m; k++)
-    PetscCall(PetscArraycpy(f->force + f->all.row[m->contact[k]], f->last + f->own.row[k],
-                            f->own.row[k + 1] - f->own.row[k]));
+  PetscCall(PetscArrayzero(f->force, f->all->row[f->all->n]));
+  if (!m->n_L) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecGetArrayRead(g->L, &L));
+  for (PetscInt k = 0; k < m->m; k++) {
+    const PetscInt begin = HycoGalerkinFirstRow(g, k), end = HycoGalerkinFirstRow(g, k + 1);
+
+    PetscCall(PetscArraycpy(f->force + f->all->row[m->contact[k]], L + begin, end - begin));
+  }
+  PetscCall(VecRestoreArrayRead(g->L, &L));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -183,14 +153,14 @@ static PetscErrorCode GalerkinFrictionBalance(HycoROM m)
 
   PetscFunctionBegin;
   if (!m->model->floating) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoSlipVectors(&f->all, f->force);
-  HycoTraceShowOther(m, &f->all.shear);
+  HycoContactStateVectors(f->all, f->force);
+  HycoTraceShowOther(m, &f->all->shear);
   PetscCall(HycoFloatingBalance(m));
-  for (PetscInt k = 0; k < f->all.n; k++) {
-    PetscReal *force = f->force + f->all.row[k];
+  for (PetscInt k = 0; k < f->all->n; k++) {
+    PetscReal *force = f->force + f->all->row[k];
     const PetscReal share = force[0] > 0 ? m->Lambda[k] / force[0] : 1;
 
-    for (PetscInt r = 0; r < f->all.row[k + 1] - f->all.row[k]; r++) force[r] *= share;
+    for (PetscInt r = 0; r < f->all->row[k + 1] - f->all->row[k]; r++) force[r] *= share;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -202,11 +172,10 @@ static PetscErrorCode ComputeSlips(HycoROM m, HycoFE fe, PetscReal *most)
   HycoRows *rows = &f->rows;
 
   PetscFunctionBegin;
-  for (PetscInt r = 0; r < f->all.row[f->all.n]; r++) {
+  for (PetscInt r = 0; r < f->all->row[f->all->n]; r++) {
     f->slack[r] = rows->gap[r];
     for (PetscInt e = rows->start[r]; e < rows->start[r + 1]; e++) f->slack[r] -= rows->value[e] * m->U[rows->dof[e]];
   }
-  PetscCall(PetscArraycpy(f->U_old, m->U, fe->n_dof));
   *most = 0;
   for (PetscInt i = 0; i < fe->n_dof; i++) *most = PetscMax(*most, PetscAbsReal(m->U[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -232,17 +201,17 @@ static void GalerkinFrictionApplyLaw(HycoROM m, PetscReal most)
   HycoGalerkinFriction f = ((HycoGalerkin)m->work)->friction;
   PetscReal force = 0;
 
-  for (PetscInt k = 0; k < f->all.n; k++) force = PetscMax(force, f->force[f->all.row[k]]);
-  for (PetscInt k = 0; k < f->all.n && most > 0; k++) {
-    const PetscInt begin = f->all.row[k];
+  for (PetscInt k = 0; k < f->all->n; k++) force = PetscMax(force, f->force[f->all->row[k]]);
+  for (PetscInt k = 0; k < f->all->n && most > 0; k++) {
+    const PetscInt begin = f->all->row[k];
 
     if (!m->model->in_rid[k])
-      GalerkinFrictionSlip(f->all.mu[k], force / most, f->all.row[k + 1] - begin, f->force + begin, f->slack + begin);
+      GalerkinFrictionSlip(f->all->mu[k], force / most, f->all->row[k + 1] - begin, f->force + begin, f->slack + begin);
   }
 }
 
-/* An accepted step, whose x and L are the path's: forces and slips of all contacts. */
-PetscErrorCode HycoGalerkinFrictionAccept(HycoROM m, HycoPath p)
+/* An accepted step to t, whose x and L are the path's: forces and slips of all contacts. */
+PetscErrorCode HycoGalerkinFrictionAccept(HycoROM m, PetscReal t)
 {
   HycoGalerkinFriction f = ((HycoGalerkin)m->work)->friction;
   PetscReal most;
@@ -251,16 +220,13 @@ PetscErrorCode HycoGalerkinFrictionAccept(HycoROM m, HycoPath p)
   PetscFunctionBegin;
   PetscCall(HycoROMComplete(m));
   PetscCall(HycoROMBringContacts(m, &fe));
-  PetscCall(HycoSlipCoefficients(&f->all, fe, &m->pairs));
-  PetscCall(HycoContactTangentRows(fe, &m->pairs, f->all.row, f->U_old, f->all.tangent, &f->rows));
+  PetscCall(HycoContactStateRows(f->all, fe, &f->rows));
   PetscCall(TakeMultipliers(m));
   if (m->ops->reconstruct && m->reconstruct) HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
   PetscCall(ComputeSlips(m, fe, &most));
   GalerkinFrictionApplyLaw(m, most);
   PetscCall(GalerkinFrictionBalance(m));
-  HycoSlipAdd(&f->all, f->force, f->slack, most);
-  HycoSlipTake(&f->own, p->t);
-  p->now.disproven += m->n_L && m->solver->sign < 0;
+  PetscCall(HycoContactStateAccept(f->all, t, f->force, f->slack, most, m->U));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -273,22 +239,7 @@ PetscErrorCode HycoGalerkinFrictionShow(HycoROM m)
   PetscFunctionBegin;
   m->beyond_current = PETSC_FALSE;
   PetscCall(HycoROMComplete(m));
-  for (PetscInt k = 0; k < f->all.n; k++) m->Lambda[k] = f->force[f->all.row[k]];
+  for (PetscInt k = 0; k < f->all->n; k++) m->Lambda[k] = f->force[f->all->row[k]];
   m->spread = PETSC_TRUE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The contacts' state at the listed time that HycoTraceRecord() has begun; sums since the begin of the path. */
-PetscErrorCode HycoGalerkinFrictionRecord(HycoROM m, HycoStep *s)
-{
-  HycoGalerkinFriction f = ((HycoGalerkin)m->work)->friction;
-  PetscReal sum[2];
-
-  PetscFunctionBegin;
-  HycoSlipSum(&f->all, sum);
-  s->friction_work = sum[0];
-  s->n_slipping = (PetscInt)sum[1];
-  PetscCall(HycoTraceListShear(m, &f->all.shear));
-  HycoTraceShow(m, m->trace.shown);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -79,7 +79,6 @@ static PetscErrorCode GalerkinPathAssemble(HycoPath p, const PetscReal mu[], Pet
   PetscCall(GalerkinPathLoads(p));
   fe->ready = PETSC_TRUE;
   if (!g->system->K) PetscCall(HycoSystemSetMatrices(g->system, g->Kr, g->Btr, g->Br, g->model->symmetric));
-  if (g->friction) PetscCall(HycoGalerkinFrictionSetCones(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -161,8 +160,20 @@ static PetscErrorCode GalerkinPathAccept(HycoPath p, const HycoStepAttempt *a)
   else
     PetscCall(HycoGalerkinExpand(m));
   PetscCall(HycoTraceAdd(m, p->t));
-  if (g->friction) PetscCall(HycoGalerkinFrictionAccept(m, p));
+  if (g->friction) PetscCall(HycoGalerkinFrictionAccept(m, p->t));
   p->now.stored = a->law.stored;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ops->accept has expanded them. */
+static PetscErrorCode GalerkinPathSurfaces(HycoPath p, PetscReal u[], PetscReal *most)
+{
+  HycoROM m = (HycoROM)p->ctx;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(u, m->U, m->fe->n_dof));
+  *most = 0;
+  for (PetscInt i = 0; i < m->fe->n_dof; i++) *most = PetscMax(*most, PetscAbsReal(u[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -225,7 +236,6 @@ static PetscErrorCode GalerkinPathRecord(HycoPath p)
     HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
   if (!g->friction) PetscCall(HycoFloatingBalance(m));
   PetscCall(HycoTraceRecord(m, PETSC_FALSE, p->begin, &p->now));
-  if (g->friction) PetscCall(HycoGalerkinFrictionRecord(m, &p->now));
   p->steps[p->n_steps++] = p->now;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -260,6 +270,7 @@ PetscErrorCode HycoGalerkinPathCreate(HycoROM m)
                                   .stiffness = GalerkinPathStiffness,
                                   .moves = GalerkinPathMoveSupports,
                                   .accept = GalerkinPathAccept,
+                                  .surfaces = GalerkinPathSurfaces,
                                   .record = GalerkinPathRecord};
   HycoGalerkin g = (HycoGalerkin)m->work;
   HycoPath p;
@@ -274,18 +285,21 @@ PetscErrorCode HycoGalerkinPathCreate(HycoROM m)
   p->ops = &ops;
   p->ctx = m;
   p->fe = m->fe;
-  p->system = g->system;
-  p->solver = m->solver;
+  p->contact.system = g->system;
+  p->contact.solver = m->solver;
   p->K = g->Kr;
-  p->B = g->Br;
-  p->Bt = g->Btr;
+  p->contact.B = g->Br;
+  p->contact.Bt = g->Btr;
   p->U = g->x;
-  p->Lambda = g->L;
+  p->contact.Lambda = g->L;
   p->rhs = g->Fr;
-  p->D = g->Dr;
+  p->contact.D = g->Dr;
   p->n_contacts = m->n_L;
   p->n_free = m->n;
-  p->has_friction = (PetscBool)(g->friction && m->n_L);
+  if (g->friction)
+    PetscCall(
+        HycoContactStateCreate(PETSC_COMM_SELF, m->model->scene, &g->own_pairs, m->model->mesh->dim, &p->friction));
+  g->state = p->friction;
   PetscCall(HycoPathSetUp(p));
   /* Newton's next iteration corrects what a refinement would. */
   PetscCall(HycoSolverSetRefine(m->solver, PETSC_FALSE));

@@ -2,7 +2,7 @@
    contacts. */
 #include <hycohybrid.h>
 #include <hycoromtypes.h>
-#include <hycoslip.h>
+#include <hycocontactstate.h>
 #include <petscviewer.h>
 
 /* Into the model's data: the solver of (41) is the user's choice, not a part of the file. */
@@ -74,7 +74,8 @@ static PetscErrorCode HybridMove(HycoROM m, HycoH5 file)
   if (HycoH5Reads(file)) h->n_dual = -1;
   /* With friction a row for each normal and tangent. */
   PetscCall(HycoH5Real(file, "reconstruction/S_lambda", &h->n_dual,
-                       HycoSlipCountRows(m->model->scene, &m->model->pairs, m->model->mesh->dim), &h->S_lambda));
+                       HycoContactStateCountRows(m->model->scene, &m->model->pairs, m->model->mesh->dim),
+                       &h->S_lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
