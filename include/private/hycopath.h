@@ -118,6 +118,7 @@ struct _n_HycoPath {
   /* Friction (path_friction.c): the state of the contacts of the system with tangents, which the path owns. Where there
      is another system without tangents, the path takes it while no coefficient is above 0 */
   HycoContactState friction; /* NULL: the scene has none */
+  HycoPairs *pairs;          /* HycoPathSetContacts() */
   PetscBool has_friction;    /* `contact` has tangents: its forces have no potential */
   HycoPathContact other;     /* the one not used now; its data are the path's. Else empty */
   char loose[HYCO_LINE];     /* the first motion that no contact force held; "": none */
@@ -204,6 +205,11 @@ void HycoPathGetHistory(HycoPath path, HycoHistory *history);
 
 /* -- friction (path_friction.c), where the path has a state of its contacts. Collective -- */
 
+/* Once the path has its solver: the contacts of its system (borrowed). If the scene has friction the path has it: their
+   state, and the method for cones (the user's options after it). rows: of its B, of this process; may be NULL. */
+PetscErrorCode HycoPathSetContacts(HycoPath path, HycoPairs *pairs, PetscInt *rows);
+/* In ops->assemble: the rows of B and the gaps at fe's parameters, with tangents if the path has friction. Local. */
+PetscErrorCode HycoPathRows(HycoPath path, HycoFE fe, HycoRows *rows);
 /* The path's vectors of a contact system, whose Lambda is set. */
 PetscErrorCode HycoPathContactSetUp(HycoPathContact *contact);
 PetscErrorCode HycoPathContactReset(HycoPathContact *contact);

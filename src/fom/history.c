@@ -403,6 +403,7 @@ static PetscErrorCode HistoryRecord(HycoPath p)
   PetscFunctionBegin;
   p->now.index = p->step;
   p->now.t = p->t;
+  if (p->friction) PetscCall(HycoContactStateMeasure(p->friction, &p->now));
   PetscCall((*p->ops->record)(p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -405,7 +405,6 @@ static PetscErrorCode FOMPathRecord(HycoPath p)
   s->stored = p->work_done.stored;
   s->dissipated = p->work_done.dissipated;
   s->thermal = p->work_done.thermal + p->work_done.moduli;
-  if (p->friction) PetscCall(HycoContactStateMeasure(p->friction, s));
   PetscCall(HycoFOMGather(f));
   f->solved = PETSC_TRUE;
   f->sigma_ready = f->all_ready = PETSC_FALSE;

@@ -12,6 +12,26 @@
 #include <hycopath.h>
 #include <hycosolverimpl.h>
 
+/* The cone of Coulomb is no set of bounds: neither active set nor TAO takes it. */
+PetscErrorCode HycoPathSetContacts(HycoPath p, HycoPairs *pairs, PetscInt *rows)
+{
+  PetscFunctionBegin;
+  p->pairs = pairs;
+  if (rows) *rows = HycoContactStateCountRows(p->scene, pairs, p->fe->dim);
+  if (!HycoSceneHasFriction(p->scene)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoContactStateCreate(p->comm, p->scene, pairs, p->fe->dim, &p->friction));
+  PetscCall(HycoSolverSetType(p->contact.solver, HYCO_SOLVER_SEMISMOOTH));
+  PetscCall(HycoSolverSetFromOptions(p->contact.solver));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPathRows(HycoPath p, HycoFE fe, HycoRows *rows)
+{
+  PetscFunctionBegin;
+  PetscCall(p->friction ? HycoContactStateRows(p->friction, fe, rows) : HycoContactRows(fe, p->pairs, rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 HycoPathContact *HycoPathContactGet(HycoPath p, PetscBool tangents)
 {
   return p->has_friction == tangents || !p->other.system ? &p->contact : &p->other;

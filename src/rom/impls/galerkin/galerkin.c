@@ -128,11 +128,6 @@ PetscErrorCode HycoGalerkinSetUp(HycoROM m)
   PetscCall(HycoSolverSetForm(m->solver, HYCO_FORM_DUAL));
   PetscCall(HycoSolverSetWarmStart(m->solver, PETSC_FALSE));
   if (HycoSolverNeedsSymmetry(m->solver)) PetscCall(HycoSolverSetType(m->solver, HYCO_SOLVER_ACTIVE_SET));
-  /* The cone of Coulomb is no set of bounds. After the type the options again: another one is refused by name. */
-  if (g->friction) {
-    PetscCall(HycoSolverSetType(m->solver, HYCO_SOLVER_SEMISMOOTH));
-    PetscCall(HycoSolverSetFromOptions(m->solver));
-  }
   if (m->model->scene->n_times) PetscCall(HycoGalerkinPathCreate(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -296,9 +296,7 @@ PetscErrorCode HycoGalerkinPathCreate(HycoROM m)
   p->contact.D = g->Dr;
   p->n_contacts = m->n_L;
   p->n_free = m->n;
-  if (g->friction)
-    PetscCall(
-        HycoContactStateCreate(PETSC_COMM_SELF, m->model->scene, &g->own_pairs, m->model->mesh->dim, &p->friction));
+  if (g->friction) PetscCall(HycoPathSetContacts(p, &g->own_pairs, NULL));
   g->state = p->friction;
   PetscCall(HycoPathSetUp(p));
   /* Newton's next iteration corrects what a refinement would. */
