@@ -376,7 +376,7 @@ static PetscErrorCode MeasureSliding(HycoFOM f, PetscReal *sliding)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Without friction; with it, friction.c does this after each step. */
+/* Without friction; with it, path_friction.c does this after each step. */
 static PetscErrorCode NameFreeMotion(HycoFOM f, HycoPath p)
 {
   char name[HYCO_LINE];
@@ -410,7 +410,7 @@ static PetscErrorCode FOMPathRecord(HycoPath p)
   f->sigma_ready = f->all_ready = PETSC_FALSE;
   PetscCall(MeasureSliding(f, &s->sliding));
   if (f->n_contacts) PetscCall(HycoFOMCountDependent(f, &s->n_dependent));
-  if (!f->friction && s->total_contact_force > 0) PetscCall(NameFreeMotion(f, p));
+  if (!p->friction && s->total_contact_force > 0) PetscCall(NameFreeMotion(f, p));
   PetscCall(HycoFOMMeasureQuantities(f, s->quantity));
   /* HycoPathSetUp() has room for all listed times and one more, the end of an incomplete path. */
   p->steps[p->n_steps++] = *s;
