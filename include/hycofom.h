@@ -138,7 +138,7 @@ PetscErrorCode HycoFOMGetSolver(HycoFOM fom, HycoSolver *solver);
    outside the ranges and if the ranks give different points. A solve that does not converge is not an error: see
    HycoSummary.reason. A scene with a history is solved from its first time to its last (docs/history.md). The results
    are then those of the last time that was reached; if this is not the last listed time, the reason is
-   HYCO_DIVERGED_STEP. */
+   HYCO_DIVERGED_STEP. After refused values the last solution stays. */
 PetscErrorCode HycoFOMSolve(HycoFOM fom, PetscInt n, const PetscReal mu[]);
 /*
   Solves K U = F - B^T Lambda at mu (length n) with given contact forces Lambda (n_contacts, read on rank 0, in the

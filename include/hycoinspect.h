@@ -1,5 +1,5 @@
 /* HycoInspection: what a scene consists of and what its mesh, contacts and costs are, over the ranges of its
-   parameters, without a solve; hyco check prints it. */
+   parameters, without a solve; hyco check prints it. hyco.h does not include it. */
 #ifndef HYCOINSPECT_H
 #define HYCOINSPECT_H
 

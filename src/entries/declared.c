@@ -10,6 +10,8 @@ PetscErrorCode HycoDeclaredAdd(HycoDeclared *d, const char name[], const char ti
   HycoEntry *e = &d->entry[d->n];
 
   PetscFunctionBegin;
+  HycoCheckGiven(name);
+  HycoCheckGiven(title);
   PetscCheck(d->n < HYCO_MAX_DECLARED, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "%s: a type has at most %d entries",
              name, HYCO_MAX_DECLARED);
   PetscCheck(!HycoDeclaredFind(d, name), PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG,

@@ -15,7 +15,7 @@ static const char *const sections[] = {"scene_",    "parameter_", "constant_", "
 /* PETSc's own options share the database: the prefix decides. */
 PetscBool HycoIsSceneKey(const char name[])
 {
-  for (size_t s = 0; s < sizeof(sections) / sizeof(sections[0]); s++) {
+  for (size_t s = 0; name && s < sizeof(sections) / sizeof(sections[0]); s++) {
     if (strncasecmp(name, sections[s], strlen(sections[s])) == 0) return PETSC_TRUE;
   }
   return PETSC_FALSE;

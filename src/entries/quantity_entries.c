@@ -105,7 +105,7 @@ static PetscBool SameText(const char a[], const char b[])
    model's scene may be older. */
 void HycoSceneMatchQuantities(HycoScene s, HycoScene other, PetscInt at[])
 {
-  for (PetscInt k = 0; k < s->n_quantities; k++) {
+  for (PetscInt k = 0; s && other && at && k < s->n_quantities; k++) {
     const HycoQuantity *q = &s->quantity[k];
 
     at[k] = -1;

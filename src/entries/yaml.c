@@ -77,6 +77,7 @@ PetscBool HycoYAMLHasProblem(const char text[], char problem[HYCO_LINE])
   yaml_parser_t parser;
   yaml_document_t document;
 
+  if (!text || !problem) return PETSC_TRUE;
   problem[0] = '\0';
   if (YamlBegin(&parser, text)) {
     CheckEvents(&parser, text, problem);

@@ -353,7 +353,8 @@ PetscErrorCode HycoFOMWriteBegin(HycoFOM f, const char path[], PetscInt n)
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   HycoCheckGiven(path);
   HycoCheck(!f->path, "HycoFOMWriteBegin: the scene has a history; HycoFOMSetSeries() writes its path");
-  PetscCall(HycoFieldFileDestroy(&f->set));
+  PetscCheck(!f->set, PETSC_COMM_SELF, PETSC_ERR_ORDER,
+             "call HycoFOMWriteEnd() of the last file before HycoFOMWriteBegin() of %s", path);
   PetscCall(HycoFieldFileCreate(HycoComm(f), path, n, PETSC_TRUE, &f->set));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

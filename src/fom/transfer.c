@@ -91,6 +91,14 @@ PetscErrorCode HycoFOMGetLambda(HycoFOM f, const PetscReal *lambda[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* On rank 0, which has the forces of all. */
+static PetscErrorCode CheckForces(const PetscReal Lambda[])
+{
+  PetscFunctionBegin;
+  HycoCheckGiven(Lambda);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The reverse: lambda of rank 0 (order of one rank) to the rows of the ranks. Collective. */
 PetscErrorCode HycoFOMSetLambda(HycoFOM f, const PetscReal lambda[])
 {
@@ -98,6 +106,7 @@ PetscErrorCode HycoFOMSetLambda(HycoFOM f, const PetscReal lambda[])
 
   PetscFunctionBegin;
   if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoOnRoot(HycoComm(f), CheckForces(lambda));
   if (f->size > 1) PetscCall(HycoFOMGetNumbers(f, &number));
   /* Rank 0 has all values; assembly sends each to its row. */
   for (PetscInt k = 0; f->rank == 0 && k < f->n_contacts; k++)

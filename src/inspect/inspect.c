@@ -291,6 +291,7 @@ PetscErrorCode HycoInspect(HycoFOM f, HycoInspection *in)
 PetscErrorCode HycoInspectionDestroy(HycoInspection *in)
 {
   PetscFunctionBegin;
+  if (!in) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt k = 0; k < in->n_motions; k++) PetscCall(PetscFree(in->motion[k]));
   HycoFreeAll(&in->motion, &in->alike);
   PetscCall(PetscFree3(in->group, in->used, in->empty));

@@ -316,6 +316,8 @@ PetscErrorCode HycoMaterialUpdate(HycoMaterial material, HycoMaterialPoints *p)
   PetscFunctionBegin;
   HycoCheckHandle(material, HYCO_MATERIAL_CLASSID);
   HycoCheckGiven(p);
+  PetscCheck(IsLame(material) || material->ops->update, PETSC_COMM_SELF, PETSC_ERR_ORDER,
+             "call HycoMaterialSetType() before HycoMaterialUpdate()");
   ns = p->n_strain;
   p->dt_factor = 1;
   p->failed = -1;

@@ -100,6 +100,8 @@ PetscErrorCode HycoSnapshotsCreateQueue(MPI_Comm comm, HycoScene scene, PetscInt
   PetscInt groups, *kind;
 
   PetscFunctionBegin;
+  HycoCheckGiven(mu || !n);
+  HycoCheckGiven(list || !n);
   HycoCheckGiven(queue);
   PetscCall(HycoSnapshotsChooseGroups(comm, scene, n_all, &groups));
   PetscCall(PetscMalloc1(n, &kind));

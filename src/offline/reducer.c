@@ -588,8 +588,9 @@ HycoDefineViewFromOptions(HycoReducer, HYCO_REDUCER_CLASSID)
 /* Cut at `length`: such texts are parts of one line. */
 void HycoReducerSettingsDescribe(const HycoReducerSettings *r, size_t length, char text[])
 {
-  const char *kind = HycoHybrids[r->hybrid];
+  const char *kind = r ? HycoHybrids[r->hybrid] : NULL;
 
+  if (!r || !text) return;
   /* As options, so that a line of a search can be repeated by them. */
   if (r->variant)
     snprintf(text, length, "%s, %s", r->type, r->variant);

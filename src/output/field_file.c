@@ -39,9 +39,12 @@ static size_t FieldFileEnding(const char path[])
 /* The margin of 16 is for endings that are added to it. */
 PetscErrorCode HycoFieldsNumbers(const char path[], char numbers[PETSC_MAX_PATH_LEN])
 {
-  const size_t ending = FieldFileEnding(path);
+  size_t ending;
 
   PetscFunctionBegin;
+  HycoCheckGiven(path);
+  HycoCheckGiven(numbers);
+  ending = FieldFileEnding(path);
   HycoCheck(
       ending && strlen(path) < PETSC_MAX_PATH_LEN - 16,
       "the output is named %s; give a name that ends in .xdmf (with the numbers in a .h5 file beside it) or in .vtkhdf",
@@ -82,6 +85,7 @@ PetscErrorCode HycoFieldFileCreate(MPI_Comm comm, const char path[], PetscInt mo
   HycoFieldFile f;
 
   PetscFunctionBegin;
+  HycoCheckValue(!points || most > 0, "a file of %d points was asked for; at least 1 is expected", (int)most);
   HycoOnRoot(comm, HycoFieldsCheckPath(path));
   PetscCall(PetscNew(&f));
   f->comm = comm;
@@ -440,9 +444,11 @@ static PetscErrorCode FieldFileRename(HycoFieldFile f, HycoFile *out)
 PetscErrorCode HycoFieldFileCommit(HycoFieldFile f)
 {
   HycoFile out = NULL;
-  PetscErrorCode ierr = FieldFileRename(f, &out);
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  PetscCheck(f->h, PETSC_COMM_SELF, PETSC_ERR_ORDER, "nothing was added to %s; add a solution first", f->path);
+  ierr = FieldFileRename(f, &out);
   if (out) PetscCall(HycoFileClose(&out, PETSC_FALSE));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -290,6 +290,9 @@ PetscErrorCode HycoSamplesOutsideTraining(HycoSamples samples, PetscInt first, P
 
   PetscFunctionBegin;
   HycoCheckGiven(unseen);
+  HycoCheckValue(first >= 0 && count >= 0 && together >= 1,
+                 "held-out points from %d, %d of them, %d together; at least 0, 0 and 1 are expected", (int)first,
+                 (int)count, (int)together);
   PetscCall(HycoSamplesGet(samples, &n, &d.n_par, &mu));
   PetscCall(HycoSamplesGetScene(samples, &scene));
   d.scene = scene;

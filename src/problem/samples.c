@@ -77,6 +77,7 @@ PetscErrorCode HycoSamplesAddProduct(HycoSamples s, const PetscInt counts[], con
     /* By a quotient: the product itself could exceed 32 bits. */
     HycoCheckValue(total <= 100000000 / counts[p], "the set has more than 100 million points; use fewer per parameter");
     total *= counts[p];
+    HycoCheckValue(values[p], "the values of parameter %s are NULL", s->scene->parameter[p]);
   }
   for (PetscInt k = 0; k < total; k++) {
     /* k in a number system whose digits have the bases counts[p]. */

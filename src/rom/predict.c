@@ -142,6 +142,8 @@ PetscErrorCode HycoROMSetSolution(HycoROM m, const PetscReal mu[], const PetscRe
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   HycoCheckGiven(mu);
+  PetscCheck(m->gamma, PETSC_COMM_SELF, PETSC_ERR_ORDER,
+             "HycoROMSetSolution() is for a type's solve, after HycoROMSetUp()");
   if (gamma) PetscCall(PetscArraycpy(m->gamma, gamma, m->model->l));
   if (Lambda) PetscCall(PetscArraycpy(m->Lambda, Lambda, m->model->pairs.n));
   PetscCall(HycoROMBringRows(m, mu));

@@ -290,6 +290,9 @@ PetscErrorCode HycoROMSetSteps(HycoROM m, PetscInt n, const PetscReal t[])
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   HycoCheck(m->model->scene->n_times,
             "HycoROMSetSteps: the model's scene has no history, and its solution has no steps");
+  for (PetscInt k = 0; t && k < n; k++)
+    HycoCheckValue(PetscIsInfOrNanReal(t[k]) ? PETSC_FALSE : k == 0 || t[k] > t[k - 1],
+                   "HycoROMSetSteps: the time %d is %g; times that increase are expected", (int)k, (double)t[k]);
   m->trace.n_given = t ? n : 0;
   m->trace.given = t;
   m->trace.most_cuts = 0;

@@ -710,8 +710,10 @@ const char *HycoReasonName(HycoReason reason)
            "away as this one, or solve full order (-hyco_fallback, hyco solve)";
   case HYCO_DIVERGED_ITERATIONS:
     return "not converged: limit of iterations reached, or a cycle";
-  default:
+  case HYCO_DIVERGED_SINGULAR:
     return "not converged: the stiffness is singular; check that supports hold every body";
+  default:
+    return reason ? "not a reason of hyco's" : "not solved";
   }
 }
 

@@ -272,6 +272,7 @@ PetscErrorCode HycoSystemCheckBlocks(HycoSystem s)
 /* The largest of the four: a solution counts as solved by it. */
 PetscReal HycoKKTMax(const HycoKKT *kkt)
 {
+  if (!kkt) return PETSC_MAX_REAL;
   return PetscMax(PetscMax(kkt->stationarity, kkt->penetration), PetscMax(kkt->adhesion, kkt->complementarity));
 }
 

@@ -31,7 +31,12 @@ static PetscErrorCode ConcatenateParts(MPI_Comm comm, PetscBool everywhere, Pets
 PetscErrorCode HycoConcatenate(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, size_t size,
                                PetscInt *n_all, void *all)
 {
-  return ConcatenateParts(comm, PETSC_FALSE, n, mine, type, size, n_all, all);
+  PetscFunctionBegin;
+  HycoCheckGiven(n_all);
+  HycoCheckGiven(all);
+  HycoCheckGiven(mine || !n);
+  PetscCall(ConcatenateParts(comm, PETSC_FALSE, n, mine, type, size, n_all, all));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The same on every rank. */

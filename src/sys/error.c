@@ -47,7 +47,7 @@ static size_t ErrorPrintable(const unsigned char *c)
 /* A message may quote a file's bytes: control characters would move a terminal's cursor or break the one line. */
 void HycoMakePrintable(char text[])
 {
-  for (char *c = text; *c;) {
+  for (char *c = text; c && *c;) {
     const size_t n = ErrorPrintable((const unsigned char *)c);
 
     if (!n) *c = strchr(" \t\r\n", *c) ? ' ' : '?';
@@ -71,6 +71,9 @@ void HycoFormat(char line[HYCO_LINE], const char format[], ...)
 PetscErrorCode HycoListAdd(char list[HYCO_LINE], const char between[], const char name[])
 {
   PetscFunctionBegin;
+  HycoCheckGiven(list);
+  HycoCheckGiven(between);
+  HycoCheckGiven(name);
   PetscCall(PetscStrlcat(list, list[0] ? between : "", HYCO_LINE));
   PetscCall(PetscStrlcat(list, name, HYCO_LINE));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -91,6 +94,7 @@ PetscErrorCode HycoCatchBegin(void)
 PetscErrorCode HycoCatchEnd(PetscErrorCode caught, char message[HYCO_LINE])
 {
   PetscFunctionBegin;
+  HycoCheckGiven(message);
   PetscCall(PetscPopErrorHandler());
   message[0] = '\0';
   if (caught) snprintf(message, HYCO_LINE, "%s", caught_line[0] ? caught_line : "unknown error");
@@ -117,6 +121,7 @@ PetscErrorCode HycoErrorSync(MPI_Comm comm, PetscErrorCode caught, const char me
   } said;
 
   PetscFunctionBegin;
+  HycoCheckGiven(message);
   PetscCallMPI(MPI_Comm_size(comm, &size));
   mine = message[0] ? HycoRank(comm) : size;
   first = mine;

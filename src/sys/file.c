@@ -63,8 +63,11 @@ void HycoFileOwner(const char name[], char owner[HYCO_FILE_NAME])
 {
   unsigned node;
   long pid;
-  const char *base = strrchr(name, '/'), *tag = FindTag(base ? base : name, &node, &pid);
+  const char *base, *tag;
 
+  if (!name || !owner) return;
+  base = strrchr(name, '/');
+  tag = FindTag(base ? base : name, &node, &pid);
   snprintf(owner, HYCO_FILE_NAME, "%.*s", (int)(tag ? (size_t)(tag - name) : strlen(name)), name);
 }
 
@@ -125,6 +128,9 @@ PetscErrorCode HycoFileScratch(MPI_Comm comm, const char path[], const char kind
   char place[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
+  HycoCheckGiven(path);
+  HycoCheckGiven(kind);
+  HycoCheckGiven(scratch);
   if (HycoRank(comm) == 0) {
     HycoFileFollow(path, place);
     FileTemporary(place, kind, scratch);
@@ -154,11 +160,14 @@ PetscErrorCode HycoFileKeep(const char scratch[], const char path[])
    without a temporary file. */
 PetscErrorCode HycoFileCheckPlace(const char option[], const char path[], HycoFileKind kind, PetscBool *direct)
 {
-  const char *dash = option[0] ? "-" : "", *blank = option[0] ? " " : "";
+  const char *dash = option && option[0] ? "-" : "", *blank = option && option[0] ? " " : "";
   char place[PETSC_MAX_PATH_LEN];
   struct stat info;
 
   PetscFunctionBegin;
+  HycoCheckGiven(option);
+  HycoCheckGiven(path);
+  HycoCheckGiven(direct);
   *direct = PETSC_FALSE;
   if (stat(path, &info) != 0) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(!S_ISDIR(info.st_mode), "%s%s%s%s is a folder; give the name of a file", dash, option, blank, path);
@@ -186,6 +195,9 @@ static PetscErrorCode CheckOpen(const char path[], PetscBool good)
 PetscErrorCode HycoFileOpenScratch(const char scratch[], const char path[], int *fd)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(scratch);
+  HycoCheckGiven(path);
+  HycoCheckGiven(fd);
   *fd = open(scratch, O_WRONLY | O_CREAT | O_EXCL, 0666);
   PetscCall(CheckOpen(path, (PetscBool)(*fd >= 0)));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -212,6 +224,8 @@ PetscErrorCode HycoFileCreate(const char path[], HycoFileKind kind, HycoFile *fi
   HycoFile f;
 
   PetscFunctionBegin;
+  HycoCheckGiven(path);
+  HycoCheckGiven(file);
   *file = NULL;
   HycoCheck(strlen(path) < PETSC_MAX_PATH_LEN, "the file name %.40s... is too long", path);
   PetscCall(PetscNew(&f));
@@ -226,7 +240,7 @@ PetscErrorCode HycoFileCreate(const char path[], HycoFileKind kind, HycoFile *fi
 
 FILE *HycoFileStream(HycoFile file)
 {
-  return file->stream;
+  return file ? file->stream : NULL;
 }
 
 /* Flushes everything written to the file. Returns 0, or errno. Only numbers are forced to the disk: text is

@@ -123,6 +123,8 @@ static PetscErrorCode CreateImage(const char name[], PetscBool table, HycoH5 *fi
 PetscErrorCode HycoH5CreateImage(const char name[], HycoH5 *file)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(name);
+  HycoCheckGiven(file);
   PetscCall(CreateImage(name, PETSC_FALSE, file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -143,6 +145,8 @@ static PetscErrorCode H5Create(const char path[], PetscBool table, HycoH5 *file)
 PetscErrorCode HycoH5Create(const char path[], HycoH5 *file)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(path);
+  HycoCheckGiven(file);
   PetscCall(H5Create(path, PETSC_FALSE, file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -228,6 +232,8 @@ static PetscErrorCode CreateShared(MPI_Comm comm, const char path[], PetscBool t
 PetscErrorCode HycoH5CreateShared(MPI_Comm comm, const char path[], HycoH5 *file)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(path);
+  HycoCheckGiven(file);
   PetscCall(CreateShared(comm, path, PETSC_FALSE, file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -237,6 +243,8 @@ PetscErrorCode HycoH5CreateShared(MPI_Comm comm, const char path[], HycoH5 *file
 PetscErrorCode HycoH5CreateTable(MPI_Comm comm, const char path[], HycoH5 *file)
 {
   PetscFunctionBegin;
+  HycoCheckGiven(path);
+  HycoCheckGiven(file);
   PetscCall(CreateShared(comm, path, PETSC_TRUE, file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -244,10 +252,14 @@ PetscErrorCode HycoH5CreateTable(MPI_Comm comm, const char path[], HycoH5 *file)
 /* HDF5 copies the image: the caller may free it. For models that are broadcast: other ranks read no file. */
 PetscErrorCode HycoH5OpenImage(const char name[], void *image, size_t size, HycoH5 *file)
 {
-  hid_t access = InMemory();
+  hid_t access;
   HycoH5 f;
 
   PetscFunctionBegin;
+  HycoCheckGiven(name);
+  HycoCheckGiven(image);
+  HycoCheckGiven(file);
+  access = InMemory();
   PetscCall(H5New(name, &f));
   f->size = size;
   f->reads = PETSC_TRUE;
@@ -298,6 +310,8 @@ PetscErrorCode HycoH5IsPrecious(const char path[], PetscBool *precious)
   char message[HYCO_LINE];
 
   PetscFunctionBegin;
+  HycoCheckGiven(path);
+  HycoCheckGiven(precious);
   *precious = PETSC_FALSE;
   HycoCatch(HycoH5Open(path, &h), caught, message);
   if (caught) PetscFunctionReturn(PETSC_SUCCESS);

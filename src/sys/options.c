@@ -37,6 +37,7 @@ static PetscErrorCode ForgetTable(void)
 PetscErrorCode HycoOptionListDestroy(HycoOptionList *list)
 {
   PetscFunctionBegin;
+  if (!list) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt k = 0; k < list->n; k++)
     PetscCall(PetscFree(list->option[k].name)); /* allocated together with the
                                                    others */
@@ -53,6 +54,8 @@ PetscErrorCode HycoOptionsRecord(HycoOptionList *list, PetscErrorCode (*declare)
   HycoOptionList *before = recording;
 
   PetscFunctionBegin;
+  HycoCheckGiven(list);
+  HycoCheckGiven(declare);
   PetscCall(PetscOptionsCreate(&none));
   recording = list;
   HycoFinally(declare(none), recording = before; readers = ""; PetscCall(PetscOptionsDestroy(&none)));
@@ -90,7 +93,7 @@ PetscErrorCode HycoGetOptionTable(PetscInt *n, const HycoOption *options[])
 /* An entry that ends with _ is a prefix: the rest of the name is the user's. Letter case is ignored, as PETSc does. */
 const HycoOption *HycoOptionListFind(const HycoOptionList *list, const char name[])
 {
-  for (PetscInt k = 0; k < list->n; k++) {
+  for (PetscInt k = 0; list && name && k < list->n; k++) {
     const char *entry = list->option[k].name;
     const size_t length = strlen(entry);
 
@@ -128,6 +131,9 @@ PetscErrorCode HycoOptionsOfSolver(const char name[], PetscBool *prefix, PetscBo
   PetscInt n;
 
   PetscFunctionBegin;
+  HycoCheckGiven(name);
+  HycoCheckGiven(prefix);
+  HycoCheckGiven(reads);
   *prefix = *reads = PETSC_FALSE;
   for (PetscInt k = 0; prefixes[k] && !*prefix; k++)
     *prefix = (PetscBool)(strncasecmp(name, prefixes[k], strlen(prefixes[k])) == 0);
@@ -155,6 +161,7 @@ PetscErrorCode HycoOptionsOfSolver(const char name[], PetscBool *prefix, PetscBo
 PetscErrorCode HycoOptionsCheckName(const char name[])
 {
   PetscFunctionBegin;
+  HycoCheckGiven(name);
   for (size_t k = 0; k < sizeof(renamed) / sizeof(renamed[0]); k++)
     HycoCheck(strcasecmp(name, renamed[k].before), "the option -%s no longer exists; it is now %s", name,
               renamed[k].now);
@@ -166,7 +173,7 @@ PetscErrorCode HycoOptionsCheckName(const char name[])
 static PetscInt EditDistance(const char *a, const char *b)
 {
   PetscInt row[129];
-  PetscInt m = (PetscInt)strlen(a), n = (PetscInt)strlen(b);
+  const PetscInt m = a ? (PetscInt)strlen(a) : 128, n = b ? (PetscInt)strlen(b) : 128; /* NULL is far from all */
 
   if (m > 127 || n > 127) return PETSC_MAX_INT;
   for (PetscInt j = 0; j <= n; j++) row[j] = j;
@@ -187,7 +194,7 @@ static PetscInt EditDistance(const char *a, const char *b)
 /* A third of the letters may differ, at least two: more would suggest unrelated words. */
 static PetscInt TooFar(const char *word)
 {
-  return PetscMax(2, (PetscInt)strlen(word) / 3) + 1;
+  return !word ? 0 : PetscMax(2, (PetscInt)strlen(word) / 3) + 1;
 }
 
 /* The name becomes the nearest if it is nearer than *best. */
@@ -206,7 +213,7 @@ const char *HycoNearest(const char *word, PetscInt n, const char *const names[])
   const char *nearest = NULL;
   PetscInt best = TooFar(word);
 
-  for (PetscInt k = 0; k < n; k++) OptionsCompare(word, names[k], &best, &nearest);
+  for (PetscInt k = 0; names && k < n; k++) OptionsCompare(word, names[k], &best, &nearest);
   return nearest;
 }
 
@@ -222,7 +229,7 @@ const char *HycoOptionNearest(const char word[], const HycoOptionList *more)
     for (PetscInt k = 0; lists[l] && k < lists[l]->n; k++) {
       const char *name = lists[l]->option[k].name;
 
-      if (strncasecmp(name, word, strlen(word)) == 0) return name; /* an abbreviation */
+      if (word && strncasecmp(name, word, strlen(word)) == 0) return name; /* an abbreviation */
       OptionsCompare(word, name, &best, &nearest);
     }
   }

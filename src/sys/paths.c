@@ -28,6 +28,7 @@ static PetscBool ReadLink(const char at[], char end[PETSC_MAX_PATH_LEN])
 /* Links in /proc name open descriptors, which must not be replaced by a name. */
 void HycoFileFollow(const char path[], char end[PETSC_MAX_PATH_LEN])
 {
+  if (!path || !end) return;
   snprintf(end, PETSC_MAX_PATH_LEN, "%s", path);
   for (int k = 0; k < LINKS && strncmp(end, "/proc/", 6); k++) {
     if (!ReadLink(end, end)) return;
@@ -42,6 +43,7 @@ void HycoFileIdentify(const char path[], HycoFileIdentity *identity)
   struct stat info;
   char *slash;
 
+  if (!path || !identity) return;
   memset(identity, 0, sizeof(*identity));
   identity->exists = (PetscBool)(stat(path, &info) == 0);
   /* /dev/null, a terminal: no file that could be overwritten. */
@@ -64,6 +66,6 @@ void HycoFileIdentify(const char path[], HycoFileIdentity *identity)
 /* Two outputs may go to one open device, such as /dev/null. */
 PetscBool HycoFileSame(const HycoFileIdentity *a, const HycoFileIdentity *b)
 {
-  return (PetscBool)(a->exists == b->exists && a->device == b->device && a->inode == b->inode && !a->open_device &&
-                     strcmp(a->name, b->name) == 0);
+  return (PetscBool)(a && b && a->exists == b->exists && a->device == b->device && a->inode == b->inode &&
+                     !a->open_device && strcmp(a->name, b->name) == 0);
 }

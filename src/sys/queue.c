@@ -76,6 +76,8 @@ PetscErrorCode HycoQueueCreate(MPI_Comm comm, PetscInt n_groups, PetscInt n, con
   HycoQueue q;
 
   PetscFunctionBegin;
+  HycoCheckGiven(queue);
+  HycoCheckGiven(kind || !n);
   PetscCall(PetscNew(&q));
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   q->comm = comm;

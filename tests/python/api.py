@@ -391,12 +391,13 @@ print(model.predict([0.07, 0.17]).total_contact_force)
         self.assertGreater(float(lines[-1]), 0)
 
     def test_null(self):
-        """Every function of the headers with NULL for its handles, and with a handle but NULL for the rest: an error or nothing, never a crash."""
+        """Every function of the headers with NULL for all arguments, for all but the handle, and for each alone beside valid ones: never a crash.
+        Calls out of order neither."""
         import ctypes  # pylint: disable=import-outside-toplevel
         import glob  # pylint: disable=import-outside-toplevel
         import re  # pylint: disable=import-outside-toplevel
+        import signal  # pylint: disable=import-outside-toplevel
         from hyco import _library as c  # pylint: disable=import-outside-toplevel
-        kinds = ('Scene', 'Samples', 'System', 'Solver', 'FOM', 'Snapshots', 'Reducer', 'ROM', 'Material', 'Contact', 'Cone')
         scene, model = self.hyco_py.Scene('block.yaml'), self.hyco_py.Model(MODEL)
         scene.solve([0.03, 900])
         made = {'HycoScene': scene._open, 'HycoFOM': scene._last, 'HycoROM': model._open}  # pylint: disable=protected-access
@@ -404,43 +405,72 @@ print(model.predict([0.07, 0.17]).total_contact_force)
                 (kind, (c.World.comm,)) for kind in ('System', 'Solver', 'Material', 'Contact', 'Cone')]:
             made['Hyco' + kind] = ctypes.c_void_p()
             c.call(f'Hyco{kind}Create', *first, ctypes.byref(made['Hyco' + kind]))
+        reals, whole = (ctypes.c_double * 8192)(0.03, 900), (c.integer()[0] * 64)(*[1] * 64)
+        lists = {'PetscReal': (ctypes.c_void_p * 64)(*[ctypes.addressof(reals)] * 64), 'char': (ctypes.c_char_p * 64)(*[b'a'] * 64)}
+        arrays = {'PetscReal': reals, 'PetscInt': whole, 'char': ctypes.create_string_buffer(b'nothing.xdmf')}
+        function = ctypes.CFUNCTYPE(ctypes.c_int)(lambda: 0)
 
-        def survives(name, arguments, handles):
-            """In a process of its own; the arguments are C's declarations."""
-            values = []
-            for argument in arguments:
-                kind = argument.replace('const ', '').split()[0]
-                if kind == 'MPI_Comm':
-                    values.append(c.World.comm)
-                elif '*' in argument or '[' in argument or '(' in argument or kind[:4] == 'Hyco':
-                    values.append(handles.get(kind) if '*' not in argument else None)
-                else:
-                    values.append(ctypes.c_double(0) if kind == 'PetscReal' else ctypes.c_longlong(0))
+        def valid(argument):
+            """What C's declaration takes: a handle, a number, an array with values, or memory for results."""
+            kind, depth = argument.replace('const ', '').split()[0], argument.count('*') + argument.count('[')
+            if kind == 'MPI_Comm':
+                return c.World.comm
+            if '(' in argument:
+                return function
+            if argument.startswith('const ') and depth and kind in made:
+                return (ctypes.c_void_p * 64)(*[made[kind].value] * 64)
+            if argument.startswith('const ') and depth:
+                read = lists if 'const ' in argument[6:] else arrays
+                return read[kind] if depth == 1 + (read is lists) and kind in read else ctypes.create_string_buffer(1 << 16)
+            return ctypes.create_string_buffer(1 << 16) if depth else made.get(kind, ctypes.c_double(0.03) if kind == 'PetscReal' else ctypes.c_longlong(2 if kind == 'PetscInt' else 0))
+
+        def survive(*calls):
+            """In a process of its own."""
             child = os.fork()
             if not child:
                 os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
                 os.dup2(1, 2)
+                signal.alarm(100 * PATIENCE)
                 c.lib.HycoKeepErrors(1)
-                getattr(c.lib, name)(*values)
+                for name, values in calls:
+                    getattr(c.lib, name)(*values)
                 os._exit(0)
             return os.WIFEXITED(os.waitpid(child, 0)[1])
 
-        crashed, tried = [], 0
+        crashed, tried, null = [], 0, ctypes.c_void_p()
         for path in glob.glob(os.path.join(SOURCE, 'include', 'hyco*.h')):
             with open(path, encoding='utf-8') as file:
                 text = re.sub(r'/\*.*?\*/', '', file.read(), flags=re.S)
-            for _, name, arguments in re.findall(r'\n(PetscErrorCode|PetscBool|PetscReal) (Hyco\w+)\(([^;{()]*(?:\(\*\w+\)\([^()]*\)[^;{()]*)?)\);', text):
-                arguments = re.sub(r'\(\*\w+\)\([^()]*\)', '*', ' '.join(arguments.split())).split(', ')
-                own = {argument.split()[0] for argument in arguments if re.fullmatch(r'Hyco\w+ \w+', argument)}
-                if name.endswith('_Private') or not hasattr(c.lib, name):
+            for name, arguments in re.findall(r'\n(?!static|typedef|extern|#)(?:const )?\w+ \*?(Hyco\w+)\(((?:[^;{()]|\(\*\w*\)\([^()]*\))*)\)[^;{]*;', text):
+                arguments = re.sub(r'\w+ \(\*(\w+)\)\([^()]*\)', r'(\1)', ' '.join(arguments.split())).split(', ')
+                addresses = [k for k, argument in enumerate(arguments) if re.search(r'[*\[(]|^Hyco', argument)]
+                if name.endswith('_Private') or not hasattr(c.lib, name) or not addresses or arguments[-1] == '...':
                     continue
-                if own & ({'Hyco' + kind for kind in kinds} | {'HycoH5', 'HycoQueue', 'HycoFile'}):
-                    tried += 1
-                    crashed += [] if survives(name, arguments, {}) else [name]
-                if own & set(made):
-                    crashed += [] if survives(name, arguments, made) else [f'{name} with a handle']
+                tried += 1
+                given = [valid(argument) for argument in arguments]
+                sets = [addresses, [k for k in addresses if arguments[k].split()[0] not in made or '*' in arguments[k]], *([k] for k in addresses)]
+                calls = [(name, [null if k in without else value for k, value in enumerate(given)]) for without in sets]
+                crashed += [] if survive(*calls) else [name]
         self.assertEqual(crashed, [])
-        self.assertGreater(tried, 200)
+        self.assertGreater(tried, 280)
+        fom, name, two = made['HycoFOM'], b'q.xdmf', c.count(2)
+        orders = [[('HycoFOMWriteBegin', (fom, name, two)), ('HycoFOMWriteEnd', (fom,))],
+                  [('HycoFOMWriteBegin', (fom, name, two)), ('HycoFOMWriteAdd', (fom,)), ('HycoFOMWriteBegin', (fom, name, two))],
+                  [('HycoFOMWriteBegin', (fom, name, c.count(0)))], [('HycoROMWriteMany', (made['HycoROM'], c.count(0), two, reals, name))],
+                  [('HycoFOMSolveForces', (fom, two, reals, None))], [('HycoROMSetSolution', (model._open, reals, reals, reals))],  # pylint: disable=protected-access
+                  [('HycoMaterialUpdate', (made['HycoMaterial'], ctypes.create_string_buffer(4096)))],
+                  [('HycoSamplesAddProduct', (made['HycoSamples'], whole, (ctypes.c_void_p * 2)()))],
+                  [('HycoSamplesOutsideTraining', (made['HycoSamples'], c.count(-4), c.count(-4), c.count(1), None, ctypes.byref(null)))]]
+        for calls in orders:
+            self.assertTrue(survive(*calls), calls)
+            for call in calls[:-1]:
+                c.call(*call[:1], *call[1])
+            with self.assertRaises(self.hyco_py.Error):
+                c.call(calls[-1][0], *calls[-1][1])
+            if len(calls) > 1:
+                c.lib.HycoKeepErrors(1)
+                c.lib.HycoFOMWriteEnd(fom)
+                c.lib.HycoKeepErrors(0)
 
     def test_views_and_options(self):
         """Views go to standard output without a viewer, and where an option of the caller's name says, with the object's prefix; options that a program
