@@ -562,6 +562,24 @@ class Decks(Case):
         left, folder = self.convert('sprung', deck([flat], held, [('', '*STATIC\n*CLOAD\nA_Y1, 2, 50.\n')], STEEL.replace('210000', '100')))
         self.assertEqual(left, [])
         self.near(self.solve(folder).displacement[:, 1].max(), 100 / (100 + 2 * 7), 1e-9)  # cell and springs side by side
+        part = '*PART, NAME=P\n*NODE\n1, 0, 0\n2, 1, 0\n3, 1, 1\n4, 0, 1\n*ELEMENT, TYPE=CPS4, ELSET=E\n1, 1, 2, 3, 4\n*SOLID SECTION, ELSET=E, MATERIAL=STEEL\n1.\n*END PART\n'
+        whole = ('*ASSEMBLY, NAME=A\n*INSTANCE, NAME=I-1, PART=P\n*END INSTANCE\n*NSET, NSET=LOW, INSTANCE=I-1\n1, 2\n*NSET, NSET=UP, INSTANCE=I-1\n3, 4\n'
+                 '*SPRING, ELSET=K\n2\n\n7.\n*ELEMENT, TYPE=SPRING1, ELSET=K\n91, I-1.3\n92, I-1.4\n*END ASSEMBLY\n')
+        steel = '*MATERIAL, NAME=STEEL\n*ELASTIC\n100., 0.\n'
+        left, folder = self.convert('sprung part', part + whole + steel + '*BOUNDARY\nLOW, 1, 2\n*STEP\n*STATIC\n*CLOAD\nUP, 2, 50.\n*END STEP\n')
+        self.assertEqual(left, [])
+        self.near(self.solve(folder).displacement[:, 1].max(), 100 / (100 + 2 * 7), 1e-9)
+        with open(self.path('shell.inp'), 'w', encoding='ascii') as file:
+            file.write((part + whole + steel).replace('CPS4', 'S4'))
+        for deck_name, reader in (('shell.inp', '-'), ('sprung part.inp', 'closed')):  # no solids; a reader that has gone
+            out, into = os.pipe()
+            os.close(out)
+            run = subprocess.run([sys.executable, os.path.join(SOURCE, 'scripts', 'convert'), self.path(deck_name), '--scene', self.path(reader)], stdout=into,
+                                 stderr=subprocess.PIPE, text=True, check=False)
+            os.close(into)
+            self.assertNotIn('Traceback', run.stderr)
+            self.assertEqual((run.returncode, 'S4' in run.stderr, os.path.exists(os.path.join(self.path(reader), 'scene.yaml'))),
+                             (1, True, False) if reader == '-' else (0, False, True), run.stderr)
         for slope, soft in (('5.e7', False), ('5.e4', True)):
             left, folder = self.convert('tied' + slope, deck([a, b], pair('B_SZ0', 'A_SZ1').replace('LINEAR\n5.e7', 'TIED\n' + slope) + SYMMETRY, [('', '*STATIC\n')]))
             with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
