@@ -315,12 +315,13 @@ PetscErrorCode HycoSamplesDrop(HycoSamples s, const PetscBool drop[])
 /* The order of the others stays. */
 PetscErrorCode HycoSamplesDropTwins(HycoSamples s, PetscInt *n_dropped)
 {
-  const PetscInt n = s->n;
+  PetscInt n;
   PetscBool *twin;
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
   HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
+  n = s->n;
   PetscCall(PetscMalloc1(s->n + 1, &twin));
   PetscCall(FindTwins(s, twin));
   PetscCall(HycoSamplesDrop(s, twin));

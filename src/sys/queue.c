@@ -77,7 +77,6 @@ PetscErrorCode HycoQueueCreate(MPI_Comm comm, PetscInt n_groups, PetscInt n, con
 
   PetscFunctionBegin;
   HycoCheckGiven(queue);
-  HycoCheckGiven(kind || !n);
   PetscCall(PetscNew(&q));
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   q->comm = comm;
