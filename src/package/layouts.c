@@ -43,8 +43,8 @@ static const HycoMember step[] = {
 
 #define F(member) FIELD(HycoHistory, member)
 static const HycoMember history[] = {
-  F(n), F(step), F(ended), F(t), F(why), F(no_equilibrium), F(newton), F(factor_cost), F(n_orders), F(order), F(n_taken), F(taken),
-  F(path_quantity), F(n_bound), F(time_error)};
+  F(n),           F(step),     F(ended), F(t),       F(why),   F(no_equilibrium), F(newton),
+  F(factor_cost), F(n_orders), F(order), F(n_taken), F(taken), F(path_quantity),  F(n_bound), F(time_error)};
 #undef F
 
 #define F(member) FIELD(HycoReaction, member)
