@@ -91,8 +91,9 @@ PetscErrorCode HycoFEElasticTangent(HycoFE fe);
 /* Whether a law of fe's cells deforms inelastically at once, as in yielding, under large strains. fe is at the
    parameters of t. Not collective. */
 PetscErrorCode HycoFEYields(HycoFE fe, PetscReal t, PetscBool *yields);
-/* rate[n_cells x points of a cell]: of the equivalent inelastic strain in the state at t, of displacements u, by a step
-   of length dt without strain: of creep, and of no other flow; linear cells are not written. *largest: equivalent
+/* rate[n_cells x points of a cell x n_sigma]: of the inelastic strain in the state at t, of displacements u, by a step
+   of length dt without strain: of creep, and of no other flow; along the stress's deviator, with the norm of the
+   equivalent strain. Linear cells are not written. *largest: equivalent
    inelastic strain of a point. fe is at the parameters of t. The state is not changed. Not collective. */
 PetscErrorCode HycoFERates(HycoFE fe, const PetscReal u[], PetscReal t, PetscReal dt, HycoFEState state,
                            PetscReal rate[], PetscReal *largest);

@@ -49,6 +49,7 @@ static void FillCommon(const DriverColumns *c, const HycoSummary *s, const HycoP
   for (PetscInt k = 0; k < DRIVER_ESTIMATES; k++) judged[k] = estimate[k] >= 0 ? estimate[k] : NAN;
   judged[DRIVER_ESTIMATES] = p->unseen;
   judged[DRIVER_ESTIMATES + 1] = p->loose;
+  judged[DRIVER_ESTIMATES + 2] = p->rid_fraction;
 }
 
 /* One point on one group: both solutions, and their difference. Both on this group's ranks. A failed full-order

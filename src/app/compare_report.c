@@ -24,8 +24,9 @@ PetscErrorCode DriverCompareColumns(PetscBool paths, PetscInt n_outputs, const c
                                       "cpu_full_order", "cpu_predicted", "lambda_norm2", "sigma_norm2"};
   static const char *const path[] = {"converged",  "times_reached",  "kkt_max",
                                      "iterations", "cpu_full_order", "cpu_predicted"};
-  static const char *const judged[] = {"estimated_error_u", "estimated_error_sigma", "estimated_error_lambda", "unseen",
-                                       "position_arbitrary"};
+  static const char *const judged[] = {"estimated_error_u",      "estimated_error_sigma",
+                                       "estimated_error_lambda", "unseen",
+                                       "position_arbitrary",     "stress_covered"};
 
   PetscFunctionBegin;
   c->paths = paths;
@@ -37,7 +38,7 @@ PetscErrorCode DriverCompareColumns(PetscBool paths, PetscInt n_outputs, const c
   PetscCall(paths ? CompareReportAdd(c, DRIVER_CPU_ROM + 1, "", path)
                   : CompareReportAdd(c, DRIVER_SIGMA_NORM + 1, "", point));
   c->estimates = c->n;
-  PetscCall(CompareReportAdd(c, DRIVER_ESTIMATES + 2, "", judged));
+  PetscCall(CompareReportAdd(c, DRIVER_ESTIMATES + 3, "", judged));
   c->outputs = c->n;
   PetscCall(CompareReportAdd(c, n_outputs, paths ? "worst_output_" : "error_output_", outputs));
   if (paths) PetscCall(CompareReportAdd(c, n_outputs, "end_output_", outputs));
@@ -90,6 +91,7 @@ static PetscErrorCode JudgeEstimates(cJSON *json, const DriverColumns *c, PetscI
   cJSON *all = cJSON_AddObjectToObject(json, "estimates");
   PetscReal *ratio, *error;
   PetscInt unseen = 0, loose = 0;
+  PetscReal covered = 1; /* the least share of the cells */
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(n, &ratio, n, &error));
@@ -121,6 +123,13 @@ static PetscErrorCode JudgeEstimates(cJSON *json, const DriverColumns *c, PetscI
     else
       PetscCall(DriverPrint(", where all errors are 0\n"));
   }
+  for (PetscInt k = 0; k < n; k++) covered = PetscMin(covered, value[k * c->n + c->estimates + DRIVER_ESTIMATES + 2]);
+  cJSON_AddNumberToObject(all, "stress_covered", covered);
+  if (covered < 1)
+    PetscCall(
+        DriverPrint("errors and estimates of stress are of %.3g %% of the cells (rid = 1 in fields); stress in the "
+                    "others is interpolated, and not compared\n",
+                    100 * (double)covered));
   for (PetscInt k = 0; k < n; k++) loose += value[k * c->n + c->estimates + DRIVER_ESTIMATES + 1] > 0;
   cJSON_AddNumberToObject(all, "position_arbitrary", loose);
   if (loose)

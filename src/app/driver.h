@@ -427,7 +427,8 @@ enum {
   DRIVER_LAMBDA_NORM, /* of full order, of points alone */
   DRIVER_SIGMA_NORM
 };
-#define DRIVER_ESTIMATES 3 /* of u, stress and forces (NaN: none); HycoPrediction.unseen and .loose follow */
+#define DRIVER_ESTIMATES                                                                                               \
+  3 /* of u, stress and forces (NaN: none); HycoPrediction.unseen, .loose, .rid_fraction follow */
 /* From column n_errors on those above, from `estimates` on the estimates, from `outputs` on the absolute error of each
    output; of a path at its worst time, then of each at the end. */
 typedef struct {

@@ -723,6 +723,20 @@ PetscErrorCode HycoFEStateVariable(HycoFE fe, HycoFEState state, const char name
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A rate of this size along the deviator of the stress: a tensor, so that a reversal is a change. */
+static void RateAlong(HycoFE fe, const PetscReal stress[], PetscReal size, PetscReal rate[])
+{
+  const PetscInt ns = fe->n_sigma;
+  const PetscReal mean = ns > 3 ? (stress[0] + stress[1] + stress[2]) / 3 : 0;
+  PetscReal norm = 0;
+
+  for (PetscInt c = 0; c < ns; c++) {
+    rate[c] = c < 3 ? stress[c] - mean : PETSC_SQRT2 * stress[c];
+    norm += PetscSqr(rate[c]);
+  }
+  for (PetscInt c = 0; c < ns; c++) rate[c] *= norm > 0 ? size / PetscSqrtReal(norm) : 0;
+}
+
 /* Of the batch's points, which do not move: only creep strains them. */
 static PetscErrorCode BatchRates(HycoFE fe, const HycoElement *el, Batch *b, PetscReal rate[], PetscReal *largest)
 {
@@ -736,7 +750,8 @@ static PetscErrorCode BatchRates(HycoFE fe, const HycoElement *el, Batch *b, Pet
   for (PetscInt i = 0; i < b->n * el->nq; i++) {
     const PetscInt cell = b->cell[i / el->nq];
 
-    rate[cell * el->nq + i % el->nq] = failed ? 0 : b->increment[i] / (b->t1 - b->t0);
+    RateAlong(fe, b->stress + i * fe->n_sigma, failed ? 0 : b->increment[i] / (b->t1 - b->t0),
+              rate + (cell * el->nq + i % el->nq) * fe->n_sigma);
     *largest = PetscMax(*largest, *PointAt(fe, b->begin, cell, i % el->nq).accumulated);
   }
   b->n = 0;

@@ -240,10 +240,16 @@ typedef struct {
   PetscReal error, allowed, largest;
 } TimeError;
 
+/* Points of the laws of this rank. */
+static PetscInt CountRates(HycoPath p)
+{
+  return p->fe->mesh->n_cells * HycoElementGet(p->fe->mesh->type)->nq;
+}
+
 /* The rates at the begin of the first step; those of others are known. Collective. */
 static PetscErrorCode FirstRates(HycoPath p, PetscReal h)
 {
-  const PetscInt n = p->flows && p->ops->rates ? p->fe->mesh->n_cells * HycoElementGet(p->fe->mesh->type)->nq : 0;
+  const PetscInt n = p->flows && p->ops->rates ? CountRates(p) * p->fe->n_sigma : 0;
 
   PetscFunctionBegin;
   p->rates = (PetscBool)(p->flows && p->ops->rates && !p->given);
@@ -260,15 +266,23 @@ static PetscErrorCode FirstRates(HycoPath p, PetscReal h)
    length, over all points, and at most the point's strain, as where creep begins with an infinite rate. Collective. */
 static PetscErrorCode EstimateTime(HycoPath p, PetscReal h, PetscReal t1, TimeError *e)
 {
-  const PetscInt n = p->fe->mesh->n_cells * HycoElementGet(p->fe->mesh->type)->nq;
+  const PetscInt n = CountRates(p), ns = p->fe->n_sigma;
   PetscReal most[2] = {0, 0}, permitted;
 
   PetscFunctionBegin;
   PetscCall((*p->ops->rates)(p, t1, RATE_STEP * h, p->end, p->rate[1], &e->largest));
   for (PetscInt i = 0; i < n; i++) {
-    const PetscReal strain = h * p->rate[1][i], change = h * PetscAbsReal(p->rate[1][i] - p->rate[0][i]) / 2;
+    PetscReal strain = 0, change = 0;
 
-    most[0] = PetscMax(most[0], PetscMin(change, strain));
+    for (PetscInt c = i * ns; c < (i + 1) * ns; c++) {
+      strain += PetscSqr(h * p->rate[1][c]);
+      change += PetscSqr(h * (p->rate[1][c] - p->rate[0][c]) / 2);
+    }
+    strain = PetscSqrtReal(strain);
+    change = PetscSqrtReal(change);
+
+    /* Later a rate that falls within the step, as of a load that goes, has strained the point by more. */
+    most[0] = PetscMax(most[0], p->largest > CREEP_ROUND_OFF ? change : PetscMin(change, strain));
     most[1] = PetscMax(most[1], strain);
   }
   HycoAllreduce(most, 2, MPIU_REAL, MPI_MAX, p->comm);

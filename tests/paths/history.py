@@ -83,6 +83,29 @@ class History(Case):
         self.near(force(self.hyco('predict', '-model', 'crept.h5', '-mu', '1.3', '-hyco_substeps', '1')), force(one), 1e-6)
         few = self.hyco('solve', '-scene', 'scene.yaml', '-mu', '1', '-body_bar_rate', '1e-20')
         self.assertEqual(few['history']['substeps'], [1, 1])
+        with open(self.path('load.yaml'), 'w', encoding='utf-8') as f:  # a load that goes, and returns reversed: rates are small at both ends of what follows
+            f.write('scene: {mesh: mesh.msh, formulation: axisymmetric}\nbody: {bar: {law: norton, young: 1e5, poisson: 0.3, rate: 2e-16, exponent: 4}}\n'
+                    'fixed: {side: {x: 0}, low: {y: 0}}\npressure: {high: 300*q}\n'
+                    'history: {times: [0, 100, 150, 400, 1000], tables: {q: [[0, 0], [100, 1], [400, 1], [500, -0.5], [1000, -0.5]]}}\n')
+        default, fine = (self.hyco('solve', '-scene', 'load.yaml', *more)['history'] for more in ((), ('-hyco_substeps', '200', '-hyco_step_inelastic', '1')))
+        self.near(default['inelastic'][-1], fine['inelastic'][-1], 1e-2)
+        unequal = [self.hyco('solve', '-scene', 'scene.yaml', '-mu', '1.3', '-history_times', '0,1,901,902,1000', *one)['history']['substeps']
+                   for one in (('-hyco_substeps', '1'), ())]
+        self.assertEqual(unequal[0], [1] * 5)
+        self.assertGreater(unequal[1][2], 5)
+
+    def test_gradient_of_default_steps(self):
+        """With steps by their error, derivatives at each listed time are those of the path with these steps, and near central differences of paths whose steps
+        change with the parameter, by the error in time."""
+        grid = Grid()
+        grid.box('quad4', [np.linspace(0, 1, 2), np.linspace(0, 4, 3)], lambda x: x, 'bar', {'x0': 'side', 'y0': 'low', 'y1': 'high'})
+        self.written('scene: {mesh: mesh.msh, parameters: [c], formulation: axisymmetric}\nparameter: {c: {range: [0.5, 2]}}\n'
+                     'body: {bar: {law: norton, young: 1e5, poisson: 0.3, rate: 1e-17*c, exponent: 5}}\n'
+                     'fixed: {side: {x: 0}, low: {y: 0}, high: {y: 0.008}}\nhistory: {times: [0, 10, 1000]}\noutput: {N: {reaction: y, group: high}}\n', grid)
+        found = self.hyco('solve', '-scene', 'scene.yaml', '-mu', '1.3', '-gradient')
+        low, high = (self.hyco('solve', '-scene', 'scene.yaml', '-mu', c)['history'] for c in ('1.29', '1.31'))
+        for k in (1, 2):
+            self.near(found['gradient_times']['N']['c'][k], (high['outputs']['N'][k] - low['outputs']['N'][k]) / 0.02, 2e-2, k)
 
     def ring(self, name, *args, **options):
         """The report and the series of the ring, on a coarse history."""

@@ -100,6 +100,8 @@ class Targets(Case):
         self.assertEqual((t['n_samples'], len(t['missed'])), (9, 1))
         c = self.hyco('compare', '-scene', 'foot', '-model', 'lost.h5', '-grid', '3,3', '-grid_type', 'centred')
         self.assertLess(c['error_u']['max'], 3*t['held_out']['u']['largest'])
+        self.near(c['estimates']['stress_covered'], t['rid_fraction'], 1e-12)  # stress in the other cells is interpolated: compare says so
+        self.assertLess(t['rid_fraction'], 1)
 
     def scattered(self, name, n):
         """A file of n points of the rope's ranges, none of which training knows."""
