@@ -1,6 +1,10 @@
 /* The active set method for dense linear complementarity, w = q + M z >= 0, z >= 0, w.z = 0. */
 #include <hycolcp.h>
 
+/* Of the largest displacement of a contact along a rigid motion: below, it is round-off of normals, which are
+   differences of coordinates, eps of the mesh over a facet (tests/contact/friction.py: test_shrunk). */
+#define TANGENTIAL 1e-12
+
 /* Data of the iterations. */
 typedef struct {
   const HycoLCP *lcp;
@@ -110,4 +114,19 @@ PetscErrorCode HycoLCPActiveSet(const HycoLCP *lcp, PetscBool active[], PetscRea
     *status = HYCO_LCP_SINGULAR; /* dependent contacts with contradictory gaps */
   PetscCall(PetscFree3(d.w, d.a, d.aside));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A body would be moved by as much as it takes to open a contact to which the motion is tangential, as along a shaft. */
+void HycoMotionsRound(PetscInt p, PetscInt n, const PetscReal reach[], PetscReal M[])
+{
+  const size_t size = (size_t)(p + n);
+
+  for (size_t i = 0; i < (size_t)p; i++) {
+    PetscReal most = reach ? reach[i] : 1;
+
+    for (size_t j = (size_t)p; j < size; j++) most = PetscMax(most, PetscAbsReal(M[i * size + j]));
+    for (size_t j = (size_t)p; j < size; j++) {
+      if (PetscAbsReal(M[i * size + j]) <= TANGENTIAL * most) M[i * size + j] = M[j * size + i] = 0;
+    }
+  }
 }

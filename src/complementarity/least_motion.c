@@ -18,10 +18,36 @@ PetscBool HycoBlockHasFriction(const HycoBlocks *b, PetscInt k)
   return (PetscBool)(b->row[k + 1] - b->row[k] > 1 && b->data[b->at[k]] > 0);
 }
 
+/* Adds to gram (p x p) the squares of the rows of block k on scaled motions. slip (NULL: the tangents hold as the
+   normal does, if there is friction): friction of the contact, which slips along it; friction turns with a motion across
+   it, and resists that one. */
+static void AddHeld(const HycoBlocks *b, PetscInt k, PetscInt p, const PetscReal A[], const PetscReal scale[],
+                    const PetscReal slip[], PetscReal gram[])
+{
+  const PetscInt first = b->row[k], size = HycoBlockHasFriction(b, k) ? b->row[k + 1] - first : 1;
+  PetscReal square = 0;
+
+  for (PetscInt c = 1; slip && c < size; c++) square += slip[c] * slip[c];
+  for (PetscInt i = 0; i < p * p; i++) {
+    PetscReal with[2] = {0, 0};
+
+    for (PetscInt c = 1; square > 0 && c < size; c++) {
+      with[0] += A[(first + c) * p + i / p] * slip[c] / square;
+      with[1] += A[(first + c) * p + i % p] * slip[c] / square;
+    }
+    for (PetscInt c = 0; c < size; c++) {
+      const PetscReal along = c && square > 0 ? slip[c] : 0, *a = A + (first + c) * p;
+
+      gram[i] += (a[i / p] - along * with[0]) * (a[i % p] - along * with[1]) / (scale[i / p] * scale[i % p]);
+    }
+  }
+}
+
 /* The free motions (p x n by columns) of the rows of blocks with a force, on scaled motions: tangents hold where there
-   is friction; slips (or NULL): not where it slips. */
+   is friction; r: the forces, where blocks slip by them; NULL: none does. */
 static PetscErrorCode FreeMotions(const HycoBlocks *b, PetscInt p, const PetscReal A[], const PetscReal scale[],
-                                  const PetscBool closed[], const PetscBool slips[], PetscInt *n, PetscReal N[])
+                                  const PetscBool closed[], const PetscBool slips[], const PetscReal r[], PetscInt *n,
+                                  PetscReal N[])
 {
   PetscReal *gram, *value, *work;
   PetscBLASInt size, lwork, info;
@@ -31,11 +57,7 @@ static PetscErrorCode FreeMotions(const HycoBlocks *b, PetscInt p, const PetscRe
   lwork = 8 * size;
   PetscCall(PetscCalloc3(p * p, &gram, p, &value, 8 * p, &work));
   for (PetscInt k = 0; k < b->n; k++) {
-    for (PetscInt j = b->row[k]; j < b->row[k + 1] && closed[k]; j++) {
-      if (j > b->row[k] && (!HycoBlockHasFriction(b, k) || (slips && slips[k]))) continue;
-      for (PetscInt i = 0; i < p * p; i++)
-        gram[i] += A[j * p + i / p] * A[j * p + i % p] / (scale[i / p] * scale[i % p]);
-    }
+    if (closed[k]) AddHeld(b, k, p, A, scale, r && slips[k] ? r + b->row[k] : NULL, gram);
   }
   LAPACKsyev_("V", "U", &size, gram, &size, value, work, &lwork, &info);
   PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev: %d", (int)info);
@@ -179,7 +201,7 @@ PetscErrorCode HycoBlocksFreeMotions(const HycoBlocks *b, PetscInt p, const Pets
     }
   }
   *n = 0;
-  if (most > 0) PetscCall(FreeMotions(b, p, A, scale, closed, slips, n, N));
+  if (most > 0) PetscCall(FreeMotions(b, p, A, scale, closed, slips, r, n, N));
   if (*n) PetscCall(FrictionSensitivity(b, p, A, f, *n, N, first));
   PetscCall(PetscFree5(scale, N, f, closed, slips));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -198,7 +220,7 @@ PetscErrorCode HycoBlocksLeastSlip(const HycoBlocks *b, PetscInt p, const PetscR
   ScaleMotions(b, p, A, scale);
   for (PetscInt k = 0; k < b->n; k++) most = PetscMax(most, r[b->row[k]]);
   for (PetscInt k = 0; k < b->n; k++) closed[k] = (PetscBool)(most > 0 && r[b->row[k]] > HYCO_FORCE_ROUND_OFF * most);
-  PetscCall(FreeMotions(b, p, A, scale, closed, NULL, n, N));
+  PetscCall(FreeMotions(b, p, A, scale, closed, NULL, NULL, n, N));
   PetscCall(PetscArrayzero(x, p));
   PetscCall(PetscArraycpy(first, N, p));
   PetscCall(PetscCalloc5(*n * *n + 1, &H, *n + 1, &g, *n + 1, &a, *n + 1, &c, *n * *n + 1, &E));

@@ -161,6 +161,11 @@ PetscErrorCode HycoFOMJudge(HycoFOM f, const PetscReal u[], Vec L, PetscReal ene
                    ? "no equilibrium: no contact forces with this friction balance the load"
                    : HycoReasonName(*reason),
                name);
+  /* Friction always has a factor: another solver is no advice. */
+  if (*reason == HYCO_DIVERGED_HELD && f->path && f->path->has_friction)
+    HycoFormat(why,
+               "not converged: no equilibrium was found for a body that friction holds; it may slide at this load: "
+               "reduce the load, raise the friction, or add a support or a spring");
   if (*reason == HYCO_DIVERGED_DISPLACEMENT)
     HycoFormat(why, "%s (%.1e times the mesh's extent)", HycoReasonName(*reason), (double)*relative);
   if (*reason == HYCO_DIVERGED_ENERGY)

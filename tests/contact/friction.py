@@ -97,6 +97,26 @@ contact: {bore: {group: outside, normal: {x: 1}, gap: "-0.01*min(t, 1)", frictio
 history: {times: [0, 1, 2]}
 output: {T: {friction: y, contact: bore}, R: {reaction: y, group: end}}
 """
+SHRUNK = """
+scene: {mesh: mesh.msh, formulation: axisymmetric, parameters: [outer]}
+parameter: {outer: {range: [14, 20]}}
+body: {shaft: {young: 1e5, poisson: 0.3}, ring: {young: 1e5, poisson: 0.3, map: {x: "10 + (x - 10)*(outer - 10)/6"}}}
+fixed: {base: {y: 0}}
+contact: {fit: {type: pair, slave: bore, master: side, friction: MU, normal: {x: -1}, gap: "-0.0125*t"}}
+history: {times: [0, 1]}
+output: {N: {max: contact_pressure, contact: fit}}
+"""
+TURNS = """
+scene: {mesh: mesh.msh, parameters: [s]}
+parameter: {s: {range: [0, 0.04]}}
+body: {block: {young: 1000, poisson: 0.3}}
+fixed: {end: {x: "0.1*max(t - 1, 0)"}}
+pressure: {top: "10*min(t, 1)"}
+traction: {top: {y: "s*max(t - 1, 0)"}}
+contact: {floor: {type: obstacle, group: base, normal: {z: -1}, gap: 0, friction: 0.3}}
+history: {times: [0, 1, 2]}
+output: {move: {mean: u_y, group: top}}
+"""
 RIGID = """
 scene: {mesh: mesh.msh}
 body: {block: {young: 1000, poisson: 0.3}, tool: {young: 1}}
@@ -324,6 +344,35 @@ class Friction(Case):
         last = self.rows(self.changed('scene.yaml', RING, ()))[2]
         self.near(last['T'], -0.25 * last['total_contact_force'], 1e-9)
         self.near(last['R'], -last['T'], 1e-8)
+
+    def test_shrunk(self):
+        """A ring of any thickness shrunk on a shaft, which contact alone holds: round-off of its normals along the shaft moves it nowhere."""
+        grid = Grid()
+        grid.box('quad4', [np.linspace(0, 10, 6), np.linspace(0, 40, 9)], lambda x: x, 'shaft', {'x1': 'side', 'y0': 'base'})
+        grid.box('quad4', [np.linspace(10, 16, 4), np.linspace(10, 30, 5)], lambda x: x, 'ring', {'x0': 'bore'})
+        grid.write(self.path('mesh.msh'))
+        for mu in ('0.2', '0'):
+            scene = self.changed('scene.yaml', SHRUNK.replace('MU', mu), ())
+            run = self.run_raw('solve', '-scene', scene, '-grid', '25', '-table', self.path('ring.csv'))
+            self.assertEqual(run.returncode, 0, run.stderr)
+            with open(self.path('ring.csv'), encoding='utf-8') as f:
+                found = [(float(row['outer']), float(row['N'])) for row in csv.DictReader(f)]
+            self.assertEqual(len(found), 25)
+            for outer, pressure in found:  # Lame, but for the ends
+                self.near(pressure, 1e5 * 0.0125 / 20 * (1 - (10 / outer)**2), 0.5)
+
+    def test_turns(self):
+        """A block in 3D drawn along a floor: friction turns with a motion across the slip and holds the block there, as s/(mu p) of the slip,
+        at full order and in a model; nothing is called arbitrary."""
+        grid = Grid()
+        grid.box('hex8', [np.linspace(0, 2, 3), np.linspace(0, 1, 3), np.linspace(0, 1, 2)], lambda x: x, 'block', {'z0': 'base', 'z1': 'top', 'x1': 'end'})
+        self.written(TURNS, grid)
+        self.hyco('train', '-scene', 'scene.yaml', '-grid', '3', '-model', 'm.h5', '-hyco_model_type', 'bodies', '-hyco_validation', '0')
+        for args in (('solve', '-scene', 'scene.yaml'), ('predict', '-model', 'm.h5')):
+            for s in (0.01, 0.04):
+                report = self.hyco(*args, '-mu', str(s))
+                self.assertFalse(report['position_arbitrary'])
+                self.near(report['history']['outputs']['move'][2], 0.1 * s / 3, 0.2)
 
     def test_creep(self):
         """Bodies that creep: Newton's method outside, the law of contact inside."""

@@ -622,6 +622,7 @@ static PetscErrorCode BodiesSolveFill(HycoBodiesWork o, Problem *p)
 {
   const HycoSubstructures b = o->bodies;
   const size_t n = (size_t)(b->p + p->n);
+  PetscReal *reach;
 
   PetscFunctionBegin;
   /* May turn kept.same off (memory). */
@@ -646,6 +647,10 @@ static PetscErrorCode BodiesSolveFill(HycoBodiesWork o, Problem *p)
       p->M[(size_t)i * n + column] = -sum;
     }
   }
+  PetscCall(PetscCalloc1(b->p + 1, &reach));
+  for (PetscInt i = 0; i < b->p * b->ns; i++) reach[i % b->p] = PetscMax(reach[i % b->p], PetscAbsReal(o->Z[i]));
+  HycoMotionsRound(b->p, p->n, reach, p->M);
+  PetscCall(PetscFree(reach));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

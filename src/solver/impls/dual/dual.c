@@ -93,6 +93,8 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
   }
   PetscCall(HycoStiffnessFactor(s, y->Bt, y->B, d->S, singular));
   if (d->made != s->stiffness.made) HycoConeFactorForget(d->cone);
+  /* The pins move by 1. */
+  if (d->made != s->stiffness.made && !*singular && y->K) HycoMotionsRound(p, y->m, NULL, d->S);
   d->made = s->stiffness.made;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
