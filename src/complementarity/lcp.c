@@ -116,7 +116,7 @@ PetscErrorCode HycoLCPActiveSet(const HycoLCP *lcp, PetscBool active[], PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A body would be moved by as much as it takes to open a contact to which the motion is tangential, as along a shaft. */
+/* Else a body would be moved by as much as it takes to open a contact to which the motion is tangential. */
 void HycoMotionsRound(PetscInt p, PetscInt n, const PetscReal reach[], PetscReal M[])
 {
   const size_t size = (size_t)(p + n);

@@ -18,9 +18,9 @@ PetscBool HycoBlockHasFriction(const HycoBlocks *b, PetscInt k)
   return (PetscBool)(b->row[k + 1] - b->row[k] > 1 && b->data[b->at[k]] > 0);
 }
 
-/* Adds to gram (p x p) the squares of the rows of block k on scaled motions. slip (NULL: the tangents hold as the
-   normal does, if there is friction): friction of the contact, which slips along it; friction turns with a motion across
-   it, and resists that one. */
+/* Adds to gram (p x p) the squares of the rows of block k on scaled motions. slip: the friction of a contact that slips
+   along it, which turns with a motion across the slip and resists that one; NULL: the tangents hold as the normal does,
+   if there is friction. */
 static void AddHeld(const HycoBlocks *b, PetscInt k, PetscInt p, const PetscReal A[], const PetscReal scale[],
                     const PetscReal slip[], PetscReal gram[])
 {
