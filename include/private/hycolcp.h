@@ -120,10 +120,17 @@ PetscErrorCode HycoLCPActiveSet(const HycoLCP *lcp, PetscBool active[], PetscRea
 /* The same with p > 0 free unknowns. */
 PetscErrorCode HycoLCPSemidefinite(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
                                    HycoLCPStatus *status);
+/* A method for forces alone, for the problem of bodies that springs hold: from L; adds to *its. soft: the springs'
+   stiffness relative to that of the contacts. */
+typedef struct {
+  PetscErrorCode (*solve)(void *ctx, const HycoLCP *held, PetscReal L[], PetscInt *its);
+  void *ctx;
+  PetscReal soft;
+} HycoHeldMethod;
 /* The same by the proximal point method, M symmetric, from the set `active`; adds to *its. RAY: no contact forces
-   balance the load; L is then a best approximation. */
-PetscErrorCode HycoLCPProximal(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
-                               HycoLCPStatus *status);
+   balance the load; L is then a best approximation. method NULL: by the active set. */
+PetscErrorCode HycoLCPProximal(const HycoLCP *lcp, const HycoHeldMethod *method, PetscBool active[], PetscReal z[],
+                               PetscInt *its, HycoLCPStatus *status);
 /*
   z with M_aa z_a = -q_a on the set a[0..*k), 0 elsewhere. Members that depend on others are removed from a (their z is
   0), and *k decreases. *singular: the remaining set could not be solved either. `factor` as in HycoLCPActiveSet().
@@ -185,6 +192,9 @@ PetscErrorCode HycoLCPWriteFclib(const HycoLCP *lcp, PetscInt dim, const PetscRe
 /* Lemke's complementary pivoting. */
 PetscErrorCode HycoLCPLemke(PetscInt n, const PetscReal M[], const PetscReal q[], PetscInt max_its, PetscReal z[],
                             PetscInt *its, HycoLCPStatus *status);
+/* The same with p > 0 free unknowns. */
+PetscErrorCode HycoLCPLemkeFree(const HycoLCP *lcp, PetscInt max_its, PetscReal z[], PetscInt *its,
+                                HycoLCPStatus *status);
 
 /* -- the derivative of a dense problem's solution -- */
 
@@ -250,7 +260,8 @@ PetscErrorCode HycoTaoSolve(HycoTao tao, Mat H, Vec f, Vec lo, Vec hi, Vec y, Pe
 /* By HYCO_TAO_ACTIVE_SET; y: the vector that the set's functions compute, y <= hi (referenced). */
 PetscErrorCode HycoTaoSolveSet(HycoTao tao, const HycoActiveSet *set, PetscBool active[], Vec hi, Vec y, PetscInt *its,
                                HycoLCPStatus *status);
-/* A dense problem by any type; hyco's active set starts from `active` and returns it, the others leave it unchanged. */
+/* A dense problem by any type; hyco's active set starts from `active` and returns it, the others leave it unchanged.
+   With free unknowns TAO's types need a symmetric problem: they solve that of bodies held by springs, which move. */
 PetscErrorCode HycoTaoSolveLCP(HycoTao tao, const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
                                PetscBool *solved);
 /*

@@ -307,3 +307,47 @@ PetscErrorCode HycoLCPLemke(PetscInt n, const PetscReal M[], const PetscReal q[]
   PetscCall(PetscFree4(d.basic, d.nonbasic, d.where, d.tied));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+/* Free unknowns in units in which their rows are as large as S: the method scales by the largest entry. unit[p]. */
+static void LemkeUnits(const HycoLCP *lcp, PetscReal unit[])
+{
+  const size_t p = (size_t)lcp->p, n = p + (size_t)lcp->n;
+  PetscReal size = 0;
+
+  for (size_t j = p; j < n; j++) size = PetscMax(size, PetscAbsReal(lcp->M[j * n + j]));
+  for (size_t i = 0; i < p; i++) {
+    PetscReal most = 0;
+
+    for (size_t j = p; j < n; j++) most = PetscMax(most, PetscAbsReal(lcp->M[j * n + i]));
+    unit[i] = most > 0 && size > 0 ? size / most : 1;
+  }
+}
+
+/* A free unknown is the difference of two nonnegative ones, x = x+ - x-: with [0 A; -A^T S] the larger matrix is
+   positive semidefinite too, which the method needs. */
+PetscErrorCode HycoLCPLemkeFree(const HycoLCP *lcp, PetscInt max_its, PetscReal z[], PetscInt *its,
+                                HycoLCPStatus *status)
+{
+  const size_t p = (size_t)lcp->p, n = p + (size_t)lcp->n, N = n + p;
+  PetscReal *M, *q, *both, *unit;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc4(N * N, &M, N, &q, N, &both, p, &unit));
+  LemkeUnits(lcp, unit);
+  for (size_t j = 0; j < N; j++) {
+    const size_t column = j < n ? j : j - n;
+    const PetscReal sign = j < n ? 1 : -1, scale = column < p ? sign * unit[column] : 1;
+
+    for (size_t i = 0; i < N; i++) {
+      const size_t row = i < n ? i : i - n;
+
+      M[j * N + i] = lcp->M[column * n + row] * scale * (row < p ? (i < n ? unit[row] : -unit[row]) : 1);
+    }
+    q[j] = column < p ? scale * lcp->q[column] : lcp->q[column];
+  }
+  PetscCall(HycoLCPLemke((PetscInt)N, M, q, max_its, both, its, status));
+  PetscCall(PetscArraycpy(z, both, n));
+  for (size_t i = 0; i < p; i++) z[i] = unit[i] * (both[i] - both[n + i]);
+  PetscCall(PetscFree4(M, q, both, unit));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -20,9 +20,12 @@
 /* Of the largest closing of a contact: 4.5e5 eps, a motion by least squares; up to there it closes none. */
 #define OPENS    1e-10
 #define MOST_ITS 200
+#define STALLED  10 /* steps without half of what the springs carry: a method's forces are not better */
 
 typedef struct {
   const HycoLCP *lcp;
+  const HycoHeldMethod *method; /* NULL: the active set */
+  PetscReal soft;               /* SOFT_SPRING, or the method's */
   PetscInt p, m;
   PetscReal *S;                             /* m x m: S + A^T A / kappa */
   PetscReal *kappa, *centre, *x, *r, *step; /* p; step: r / kappa */
@@ -56,7 +59,7 @@ static void SetSprings(Proximal *h)
       const PetscReal *A = ProximalColumn(h, j), *S = A + h->p;
 
       /* 1 / S_jj is the stiffness of contact j, A_ij its arm on unknown i. */
-      if (S[j] > 0) h->kappa[i] = PetscMax(h->kappa[i], SOFT_SPRING * A[i] * A[i] / S[j]);
+      if (S[j] > 0) h->kappa[i] = PetscMax(h->kappa[i], h->soft * A[i] * A[i] / S[j]);
     }
     most = PetscMax(most, h->kappa[i]);
   }
@@ -121,8 +124,13 @@ static PetscErrorCode SolveForces(Proximal *h, PetscBool active[], PetscReal L[]
     h->gap[j] = h->lcp->q[h->p + j] - ProximalClosingOf(h, j, h->x);
     if (h->S[(size_t)j * (size_t)h->m + (size_t)j] == 0) h->gap[j] = 0; /* a contact without a row */
   }
-  PetscCall(HycoLCPActiveSet(&held, active, L, &more, status));
-  *its += more;
+  if (h->method) {
+    PetscCall(h->method->solve(h->method->ctx, &held, L, its));
+    *status = HYCO_LCP_SOLVED; /* what the springs carry decides */
+  } else {
+    PetscCall(HycoLCPActiveSet(&held, active, L, &more, status));
+    *its += more;
+  }
   /* S + A^T A / kappa is semidefinite at least, for which Lemke's method ends with a solution if there is one. */
   if (*status != HYCO_LCP_SOLVED) {
     PetscCall(HycoLCPLemke(h->m, h->S, h->gap, 50 * (h->m + 10), L, &more, status));
@@ -136,12 +144,10 @@ static PetscErrorCode SolveForces(Proximal *h, PetscBool active[], PetscReal L[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the springs carry nothing but round-off. Relative to each unknown's own forces, but not to less than 1e-3
-   of the largest. */
-static PetscBool ProximalBalanced(const Proximal *h, const PetscReal L[])
+/* What the springs carry, relative to each unknown's own forces, but not to less than 1e-3 of the largest. */
+static PetscReal ProximalImbalance(const Proximal *h, const PetscReal L[])
 {
-  PetscReal most = 0;
-  PetscBool all = PETSC_TRUE;
+  PetscReal most = 0, worst = 0;
 
   /* The first pass finds the largest size, with which the second one compares. */
   for (PetscInt pass = 0; pass < 2; pass++) {
@@ -149,11 +155,11 @@ static PetscBool ProximalBalanced(const Proximal *h, const PetscReal L[])
       PetscReal size = PetscAbsReal(h->lcp->q[i]);
 
       for (PetscInt j = 0; j < h->m; j++) size += PetscAbsReal(ProximalColumn(h, j)[i]) * L[j];
-      if (pass) all = (PetscBool)(all && PetscAbsReal(h->r[i]) <= SPRINGS_CARRY * PetscMax(size, 1e-3 * most));
+      if (pass && h->r[i] != 0) worst = PetscMax(worst, PetscAbsReal(h->r[i]) / PetscMax(size, 1e-3 * most));
       most = PetscMax(most, size);
     }
   }
-  return all;
+  return worst;
 }
 
 /* Whether the step r / kappa is a motion that closes no contact and on which the load has work. If not, *far: how many
@@ -192,14 +198,20 @@ static PetscBool ProximalIsFreeMotion(Proximal *h, const PetscReal L[], PetscRea
 static PetscErrorCode ProximalIterate(Proximal *h, PetscBool active[], PetscReal L[], PetscInt *its,
                                       HycoLCPStatus *status)
 {
-  PetscReal far;
+  PetscReal far, left, least = PETSC_MAX_REAL;
+  PetscInt at = 0;
 
   PetscFunctionBegin;
   SetSprings(h);
   PetscCall(AddSprings(h));
-  for (PetscInt k = 0; k < MOST_ITS; k++) {
+  if (h->method) PetscCall(PetscArrayzero(L, h->m));
+  for (PetscInt k = 0; k < MOST_ITS && !(h->method && k > at + STALLED); k++) {
     PetscCall(SolveForces(h, active, L, its, status));
-    if (*status != HYCO_LCP_SOLVED || ProximalBalanced(h, L)) PetscFunctionReturn(PETSC_SUCCESS);
+    if (*status != HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
+    left = ProximalImbalance(h, L);
+    if (left <= SPRINGS_CARRY) PetscFunctionReturn(PETSC_SUCCESS);
+    if (left <= least / 2) at = k;
+    least = PetscMin(least, left);
     /* LIMIT stands until a further step balances the forces; it is what the caller sees after MOST_ITS. */
     *status = ProximalIsFreeMotion(h, L, &far) ? HYCO_LCP_RAY : HYCO_LCP_LIMIT;
     if (*status == HYCO_LCP_RAY) PetscFunctionReturn(PETSC_SUCCESS);
@@ -210,11 +222,11 @@ static PetscErrorCode ProximalIterate(Proximal *h, PetscBool active[], PetscReal
 
 /* z = (x_pinned, L) by the proximal point method; HYCO_LCP_RAY: no equilibrium exists. M must be symmetric in its
    block S. */
-PetscErrorCode HycoLCPProximal(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
-                               HycoLCPStatus *status)
+PetscErrorCode HycoLCPProximal(const HycoLCP *lcp, const HycoHeldMethod *method, PetscBool active[], PetscReal z[],
+                               PetscInt *its, HycoLCPStatus *status)
 {
   const PetscInt p = lcp->p, m = lcp->n;
-  Proximal h = {.lcp = lcp, .p = p, .m = m};
+  Proximal h = {.lcp = lcp, .method = method, .soft = method ? method->soft : SOFT_SPRING, .p = p, .m = m};
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2((size_t)m * (size_t)m, &h.S, m, &h.gap));

@@ -410,7 +410,7 @@ static PetscErrorCode SemidefiniteContinue(const HycoActiveSet *e, const HycoLCP
   PetscBool *set, exact = PETSC_FALSE, singular = PETSC_FALSE;
 
   PetscFunctionBegin;
-  PetscCall(HycoLCPProximal(lcp, active, z, its, status));
+  PetscCall(HycoLCPProximal(lcp, NULL, active, z, its, status));
   HycoDuplicate((size_t)h->n, z, &found);
   HycoDuplicate((size_t)h->m, active, &set);
   if (*status == HYCO_LCP_SOLVED) PetscCall(TakeExact(h, active, &singular, &exact));

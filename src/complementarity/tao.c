@@ -567,8 +567,8 @@ static void TaoClean(const HycoLCP *lcp, PetscReal z[])
   }
 }
 
-/* Makes scaled copies of M, -q and the bounds, for TAO's types. TAO's types overwrite and scale their matrix. */
-static PetscErrorCode CopyDense(HycoTao t, const HycoLCP *lcp)
+/* Makes copies of M, -q and the bounds, for TAO's types, which overwrite and scale their matrix. start NULL: 0. */
+static PetscErrorCode CopyDense(HycoTao t, const HycoLCP *lcp, const PetscReal start[])
 {
   PetscScalar *h;
   PetscInt n = -1;
@@ -588,7 +588,10 @@ static PetscErrorCode CopyDense(HycoTao t, const HycoLCP *lcp)
   PetscCall(HycoMatAssemble(t->dense));
   /* The matrix is used again for a problem of the same size, which may have another symmetry. */
   PetscCall(MatSetOption(t->dense, MAT_SYMMETRIC, lcp->symmetric));
-  PetscCall(VecSet(t->y, 0));
+  if (start)
+    PetscCall(HycoVecWrite(t->y, lcp->n, start));
+  else
+    PetscCall(VecSet(t->y, 0));
   PetscCall(VecSet(t->lo, 0));
   PetscCall(VecSet(t->hi, PETSC_INFINITY));
   PetscCall(VecGetArray(t->f, &h));
@@ -615,6 +618,41 @@ static PetscErrorCode PlaceSolution(HycoTao t, PetscInt n, PetscReal z[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The bodies' problem with springs, from the forces before the springs moved. */
+static PetscErrorCode TaoSolveHeld(void *ctx, const HycoLCP *held, PetscReal L[], PetscInt *its)
+{
+  HycoTao t = (HycoTao)ctx;
+  PetscInt more = 0;
+  PetscBool solved;
+
+  PetscFunctionBegin;
+  PetscCall(CopyDense(t, held, L));
+  PetscCall(HycoTaoSolve(t, t->dense, t->f, t->lo, t->hi, t->y, &more, &solved));
+  PetscCall(HycoVecRead(t->y, held->n, L));
+  TaoClean(held, L);
+  *its += more;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define STIFF 1 /* of springs relative to a contact: softer ones need fewer problems of more iterations each */
+
+/* TAO's types know forces alone: those of bodies that springs hold, which are moved until they carry nothing. */
+static PetscErrorCode TaoSolveFree(HycoTao t, const HycoLCP *lcp, PetscReal z[], PetscInt *its, PetscBool *solved)
+{
+  const HycoHeldMethod method = {TaoSolveHeld, t, STIFF};
+  PetscBool *active;
+  HycoLCPStatus status;
+
+  PetscFunctionBegin;
+  PetscCheck(lcp->symmetric, PETSC_COMM_SELF, PETSC_ERR_SUP, "TAO's types need a symmetric problem of free unknowns");
+  *its = 0;
+  PetscCall(PetscCalloc1(lcp->n + 1, &active));
+  PetscCall(HycoLCPProximal(lcp, &method, active, z, its, &status));
+  *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
+  PetscCall(PetscFree(active));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A dense problem on one process (or alike on every rank), by hyco's or TAO's types. active: start and result of the
    active set, unused by others. */
 PetscErrorCode HycoTaoSolveLCP(HycoTao t, const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
@@ -638,7 +676,11 @@ PetscErrorCode HycoTaoSolveLCP(HycoTao t, const HycoLCP *lcp, PetscBool active[]
     *solved = (PetscBool)(t->status == HYCO_LCP_SOLVED);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(CopyDense(t, lcp));
+  if (lcp->p) {
+    PetscCall(TaoSolveFree(t, lcp, z, its, solved));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(CopyDense(t, lcp, NULL));
   PetscCall(HycoTaoSolve(t, t->dense, t->f, t->lo, t->hi, t->y, its, solved));
   PetscCall(HycoVecRead(t->y, lcp->n, z));
   TaoClean(lcp, z);

@@ -122,7 +122,10 @@ static PetscErrorCode SolveActiveSet(Tao tao)
 static PetscErrorCode DenseLemke(HycoTao t, const HycoLCP *lcp)
 {
   PetscFunctionBegin;
-  PetscCall(HycoLCPLemke(lcp->n, lcp->M, lcp->q, t->tao->max_it, t->z, &t->its, &t->status));
+  if (lcp->p)
+    PetscCall(HycoLCPLemkeFree(lcp, t->tao->max_it, t->z, &t->its, &t->status));
+  else
+    PetscCall(HycoLCPLemke(lcp->n, lcp->M, lcp->q, t->tao->max_it, t->z, &t->its, &t->status));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -136,8 +139,7 @@ static PetscErrorCode SolveLemke(Tao tao)
     PetscCall(HycoTaoNewton(tao, PETSC_TRUE));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCheck(t->lcp && !t->lcp->p, PetscObjectComm((PetscObject)tao), PETSC_ERR_SUP,
-             "Lemke's method needs a dense matrix, and no free unknowns");
+  PetscCheck(t->lcp, PetscObjectComm((PetscObject)tao), PETSC_ERR_SUP, "Lemke's method needs a dense matrix");
   PetscCall(SolveDense(tao, DenseLemke));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -71,10 +71,17 @@ class Block(Case):
                              'press = -100: no equilibrium: a body is held by contact only, and this load lifts it off; no support keeps body block' in w])), (2, 1))
 
     def test_other_types(self):
-        """Methods that cannot solve for floating bodies name the one that can."""
-        run = self.run_raw('solve', '-scene', self.scene(PAIR), '-mu', '0.04,100', '-hyco_solver_type', 'lemke')
-        self.assertEqual(run.returncode, 1)
-        self.assertIn('use -hyco_solver_type active_set', run.stderr)
+        """Every method solves for a body that contact alone holds: the active set's contacts, and forces to 1e-9; a type of TAO's names what lifts the body off."""
+        args = ('solve', '-scene', self.scene(PAIR), '-hyco_solver_fallback', 'false')
+        expected = self.hyco(*args, '-mu', '0.04,100')
+        for tao in (None, 'gpcg', 'tron', 'bntr', 'bnls', 'blmvm', 'bqnkls', 'bncg', 'bqpip', 'ssils'):
+            for kind in ('tao',) if tao else ('lemke', 'semismooth'):
+                with self.subTest(kind=kind, tao=tao):
+                    r = self.hyco(*args, '-mu', '0.04,100', '-hyco_solver_type', kind, *(('-hyco_tao_type', tao) if tao else ()))
+                    self.assertIn(tao or kind, r['solver'])
+                    self.assertEqual(r['n_active'], expected['n_active'])
+                    self.near(r['total_contact_force'], expected['total_contact_force'], 1e-9)
+        self.assertIn('lifts it off', self.run_raw(*args, '-mu', '0.04,-1', '-hyco_solver_type', 'tao').stderr)
 
     def test_held_by_nothing(self):
         """A body with neither support nor contact is named."""

@@ -32,9 +32,11 @@ static PetscErrorCode DualAccepts(HycoSolver s, HycoSolverForm form, PetscBool a
   *cost = -1;
   if (!y->K || !y->m || s->iterative) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSystemPinned(y, &p));
-  if (p && strcmp(s->now.type, HYCO_TAO_ACTIVE_SET) && !(y->blocks && s->now.traits & HYCO_TAO_CONES)) {
-    HycoFormat(why, "a body is held by contact only, which %s cannot solve; use -hyco_solver_type active_set",
-               s->now.word);
+  if (p && !y->symmetric && !(s->now.traits & HYCO_TAO_OWN)) {
+    HycoFormat(why,
+               "a body is held by contact only, for which TAO's %s needs a symmetric system; use -hyco_solver_type "
+               "active_set, lemke or semismooth",
+               s->now.type);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   /* A fallback must not ask for a dense matrix that the choice of forms has avoided. */
@@ -166,6 +168,7 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *s
                  .sign = s->system->blocks ? &s->sign : NULL,
                  .monitor = s->monitor,
                  .monitor_ctx = s->monitor_ctx};
+  const PetscBool set = (PetscBool)(d->p && !strcmp(s->now.type, HYCO_TAO_ACTIVE_SET));
   char name[HYCO_LINE] = "dual";
 
   PetscFunctionBegin;
@@ -198,9 +201,9 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *s
     PetscReal *L = d->L + d->p + i;
 
     /* Active forces of floating bodies may be 0 at a degenerate vertex, so that the set is kept as it is; without
-       them it follows from the forces. */
-    *L = d->p && !d->active[i] ? 0 : PetscMax(*L, 0);
-    if (!d->p) d->active[i] = (PetscBool)(*L > 0);
+       them, and by other methods, it follows from the forces. */
+    *L = set && !d->active[i] ? 0 : PetscMax(*L, 0);
+    if (!set) d->active[i] = (PetscBool)(*L > 0);
   }
   /* A set of blocks is no set of closed rows. */
   d->started = (PetscBool)(*solved && !blocks);
