@@ -63,7 +63,7 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver);
 /* Sets (references) the system. */
 PetscErrorCode HycoSolverSetSystem(HycoSolver solver, HycoSystem system);
 /* -hyco_solver_type. A solve of a system with other cones than forces >= 0 (HycoSystemSetBlocks()) refuses each type
-   but semismooth, which has no fallback there, and each form but dual and that of a given flexibility. */
+   but semismooth, which has no fallback there, and each form but dual and, without K, condensed. */
 PetscErrorCode HycoSolverSetType(HycoSolver solver, HycoSolverType type);
 /*
   -hyco_tao_type: for the type tao. Bound-constrained (symmetric systems): gpcg, tron, bntr, bnls, bntl, blmvm, bncg,

@@ -1,11 +1,12 @@
 /*
   HycoSystem: the contact system, the problem that all models of the paper solve,
 
-      K x + Bt L = F,     0 <= L  complementary to  D - B x >= 0
+      K x + Bt L = F,     0 <= L  complementary to  D - B x + W L >= 0
 
-  full order (16), hybrid hyper-reduced (38), projection-based (44) and local indicator (43). They differ in the code
-  that builds K, Bt, B, F and D, not in the problem. A program may divide the rows into blocks, each with the law of a
-  cone in place of the second condition (HycoSystemSetBlocks(), hycocone.h).
+  full order (16), hybrid hyper-reduced (38), projection-based (44) and local indicator (43), for which W = 0; bodies,
+  whose x are the rigid motions that contact alone prevents, K = 0 and W their flexibility at the contacts. They differ
+  in the code that builds K, Bt, B, W, F and D, not in the problem. A program may divide the rows into blocks, each with
+  the law of a cone in place of the second condition (HycoSystemSetBlocks(), hycocone.h).
 */
 #ifndef HYCOSYSTEM_H
 #define HYCOSYSTEM_H
@@ -52,20 +53,28 @@ PetscErrorCode HycoSystemDestroy(HycoSystem *system);
   K is symmetric positive definite and Bt = B^T. If a body is held by contact only, K is semidefinite: attach its null
   space, an orthonormal basis, by MatSetNullSpace(). Changes of a matrix in place are detected by its state. For
   iterative solves, a vector of length m may be composed with B as HYCO_SLAVES. It has the node of each contact, given
-  by the number of the node's first unknown.
+  by the number of the node's first unknown. K NULL: K = 0, all x are free, as the rigid motions of bodies that are a
+  compliance otherwise (HycoSystemSetCompliance()); B is dense on one process, Bt its transpose (NULL).
 */
 #define HYCO_SLAVES "hyco_slaves"
 PetscErrorCode HycoSystemSetMatrices(HycoSystem system, Mat K, Mat Bt, Mat B, PetscBool symmetric);
 /* The matrices; each output may be NULL. Not collective. Borrowed. */
 PetscErrorCode HycoSystemGetMatrices(HycoSystem system, Mat *K, Mat *Bt, Mat *B);
-/* Sets (references) F of length n and D of length m (NULL without contact). */
+/* Sets (references) F of length n and D of length m (NULL without contact). Without K an entry of D may be
+   PETSC_INFINITY: this row cannot close. */
 PetscErrorCode HycoSystemSetVectors(HycoSystem system, Vec F, Vec D);
 /* The vectors; each output may be NULL. Not collective. Borrowed. */
 PetscErrorCode HycoSystemGetVectors(HycoSystem system, Vec *F, Vec *D);
 /*
-  Sets (references) a flexibility instead of K: w = g + G L >= 0 complementary to L >= 0, G = B K^-1 Bt m x m, dense, on
-  one process, symmetric positive semidefinite, g = D - B K^-1 F. Such a system has no displacements (x is NULL in a
-  solve) and no stationarity. Replaces the matrices, and is replaced by HycoSystemSetMatrices().
+  Sets (references) the compliance of the contacts, W m x m, symmetric positive semidefinite, in the layout of B, after
+  HycoSystemSetMatrices(), which takes it away, as NULL does. Of any type with MatMult() and rows (MatGetRow()). The
+  dual form takes it, and without K the only one, condensed.
+*/
+PetscErrorCode HycoSystemSetCompliance(HycoSystem system, Mat W);
+/*
+  A system of W alone: w = g + G L >= 0 complementary to L >= 0, G = B K^-1 Bt m x m on one process, symmetric positive
+  semidefinite, g = D - B K^-1 F. It has no displacements (x is NULL in a solve) and no stationarity. Replaces the
+  matrices, and is replaced by HycoSystemSetMatrices().
 */
 PetscErrorCode HycoSystemSetFlexibility(HycoSystem system, Mat G, Vec g);
 /*

@@ -20,7 +20,7 @@
 #include <hycomaterialimpl.h>
 #include <hycoromimpl.h>
 #include <hycocontactstate.h>
-#include <hycosolver.h>
+#include <hycosolverimpl.h>
 #include <petscblaslapack.h>
 
 /* Where a body is, relative to its nodes at another point: x = s Q X + t. */
@@ -237,9 +237,16 @@ typedef struct _n_HycoBodiesWork {
   PetscReal *row;
   HycoBodiesRowCache kept;
   PetscReal *gap;    /* by contact: without the forces */
-  PetscBool *active; /* of the contacts in the problem */
-  HycoTao tao;       /* the active set; if it fails, or another method is asked for: */
-  HycoSolver solver; /* borrowed, or `own` */
+  PetscBool *active; /* contacts of the first problem */
+  /* bodies_system.c: x are the motions, W a shell on this work */
+  HycoSystem system;
+  Mat W, B; /* of `rows_B` */
+  PetscReal *rows_B;
+  Vec D, F, motion, L;           /* F, motion: NULL without motions */
+  PetscReal *bent, *bent_by;     /* -C f / kappa of the surfaces (ns), and the forces by contact that it belongs to, */
+  PetscBool is_bent;             /* if any */
+  PetscReal *response_u, *terms; /* u - free (ns) and, by contact, the terms of the gap at the last residuals */
+  HycoSolver solver;             /* borrowed, or `own` */
   HycoSolver own;
   HycoReason reason; /* of the last solve; its iterations */
   PetscInt its;
@@ -387,6 +394,12 @@ PetscReal HycoBodiesLoadWork(HycoBodiesWork work, PetscInt motion);
 PetscBool HycoBodiesLoaded(HycoBodiesWork work);
 /* Of the loads' parts on all motions. */
 PetscReal HycoBodiesLoadRounding(HycoBodiesWork work);
+/* The contact system: D, F, B and W at the prepared parameters by HycoBodiesUpdateSystem(). HycoBodiesBend(): `bent` for
+   these forces. */
+PetscErrorCode HycoBodiesCreateSystem(HycoBodiesWork work);
+PetscErrorCode HycoBodiesDestroySystem(HycoBodiesWork work);
+PetscErrorCode HycoBodiesUpdateSystem(HycoBodiesWork work);
+PetscErrorCode HycoBodiesBend(HycoBodiesWork work, const PetscReal Lambda[]);
 /* M of n contacts at the prepared parameters: p + n square by columns. */
 PetscErrorCode HycoBodiesMatrix(HycoBodiesWork work, PetscInt n, const PetscInt contact[], PetscReal M[]);
 /* Ops of gradients. */
@@ -433,9 +446,10 @@ PetscErrorCode HycoBodiesLiftOff(HycoBodiesWork work, const HycoBodiesSurface *s
                                  char name[HYCO_LINE], PetscBool *lift_off);
 /* g (p): row k of the contacts times the motions. */
 void HycoBodiesMotionRow(HycoBodiesWork work, PetscInt k, PetscReal g[]);
-/* The residuals at the contacts, recomputed from U and the forces; `stationarity` is that of floating bodies. Returns
-   the largest without the effect of rounding the terms whose sum the displacements are, which judges the solve. */
-PetscReal HycoBodiesMeasure(HycoROM model, HycoKKT *kkt);
+/* The residuals of the contact system (solved: those of the solve just done), `stationarity` that of floating bodies;
+   U must have the gaps of the system. *residual: the largest without the effect of rounding the terms whose sum the
+   displacements are, which judges the solve. */
+PetscErrorCode HycoBodiesMeasure(HycoROM model, PetscBool solved, HycoKKT *kkt, PetscReal *residual);
 /* Of the motions that contact alone prevents, HycoROMImbalance(); -1 (beyond: 0): there are none. beyond: without
    round-off, to judge a solve. */
 PetscReal HycoBodiesImbalance(HycoBodiesWork work, PetscBool beyond);

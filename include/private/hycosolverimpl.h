@@ -14,20 +14,35 @@ typedef struct {
   PetscReal *stiffness;
 } HycoSoft;
 
+/* Composed with a compliance: the block of n contacts, by columns, lda apart. Instead of the rows of W: a PETSc matrix
+   made for each round would cost as much as a small prediction. */
+#define HYCO_COMPLIANCE_BLOCK "HycoComplianceBlock_C"
+typedef PetscErrorCode (*HycoComplianceBlock)(Mat W, PetscInt n, const PetscInt contact[], PetscInt lda,
+                                              PetscScalar block[]);
+/* Composed with one in which soft springs are, so that D and W L are huge and their sum is not: after MatMult(), the
+   size of gaps and displacements, and by row the sizes of the terms that the gap is the sum of (borrowed). */
+#define HYCO_COMPLIANCE_TERMS "HycoComplianceTerms_C"
+typedef PetscErrorCode (*HycoComplianceTerms)(Mat W, Vec x, PetscReal *size, const PetscReal *terms[]);
+
 struct _p_HycoSystem {
   PETSCHEADER(int);
-  Mat K, Bt, B; /* referenced; NULL where the flexibility is given */
-  Mat G;        /* referenced: the flexibility B K^-1 Bt, dense; NULL if K is given */
-  Vec F, D;     /* referenced; D: if G is given, the gap without forces */
+  Mat K, Bt, B;      /* referenced; K, Bt NULL: K = 0, x are free; B NULL too: there are no x */
+  Mat W;             /* referenced: the compliance of the contacts; NULL: 0 */
+  PetscBool dense_W; /* it is MATSEQDENSE; its functions, or NULL: */
+  HycoComplianceBlock block_W;
+  HycoComplianceTerms terms_W;
+  Vec F, D; /* referenced; F is NULL without x */
   PetscBool symmetric;
   const HycoSoft *soft; /* borrowed; NULL or without motions: those of K's null space */
   PetscInt n, m;        /* numbers of unknowns, and of rows: of contacts if these have one component each */
   HycoBlocks *blocks;   /* of this rank's rows; NULL: each row is a force >= 0 */
   /* work vectors of the residuals, created by the first */
-  Vec work_x[2], work_L; /* like F, like D */
-  PetscReal size_B;      /* its largest row sum, valid while B is unchanged */
-  PetscReal rounding;    /* of an entry of F, where F is a difference; 0: not known */
-  PetscReal residual;    /* 2-norm of F - K x - Bt L beyond round-off, when residuals were last computed */
+  Vec work_x[2], work_L, work_W; /* like F, like D; work_L: the gaps of the last residuals */
+  PetscReal size, beyond;        /* of these gaps; the largest residual without the effect of rounding terms */
+  const PetscReal *terms;        /* of these gaps, by row, if W tells them; borrowed */
+  PetscReal size_B;              /* its largest row sum, valid while B is unchanged */
+  PetscReal rounding;            /* of an entry of F, where F is a difference; 0: not known */
+  PetscReal residual;            /* 2-norm of F - K x - Bt L beyond round-off, when residuals were last computed */
   HycoOperatorState seen_B;
 };
 
@@ -43,8 +58,33 @@ PetscErrorCode HycoSystemMotions(HycoSystem system, PetscInt *n, const Vec *v[],
 PetscErrorCode HycoSystemPinned(HycoSystem system, PetscInt *n);
 /* Pins them. Collective. */
 PetscErrorCode HycoSystemPin(HycoSystem system, HycoDirect direct);
-/* Creates the work vectors of a system whose vectors are set. */
+/* The largest of each value over the ranks. Collective. */
+PetscErrorCode HycoSystemMost(HycoSystem system, PetscMPIInt n, PetscReal value[]);
+/* Creates the work vectors of a system whose vectors are set, and destroys them. */
 PetscErrorCode HycoSystemWork(HycoSystem system);
+PetscErrorCode HycoSystemFreeWork(HycoSystem system);
+
+/* -- a compliance -- */
+
+/* The block of W, on every rank. Collective. */
+PetscErrorCode HycoSystemCompliance(HycoSystem system, PetscInt n, const PetscInt contact[], PetscInt lda,
+                                    PetscScalar block[]);
+/* The problem of n contacts without K: M = [0 A; -A^T W] (square, by columns) of the free unknowns and them, and
+   q = (-F, D) (NULL: not wanted). On one process. */
+PetscErrorCode HycoSystemFill(HycoSystem system, PetscInt n, const PetscInt contact[], PetscReal M[], PetscReal q[]);
+/* The gaps w = D - B x + W L, and their `size`: what joins, closes and is measured. HycoSystemAddCompliance(): the last
+   term. Collective. */
+PetscErrorCode HycoSystemGaps(HycoSystem system, Vec x, Vec L, Vec w);
+PetscErrorCode HycoSystemAddCompliance(HycoSystem system, Vec L, Vec w, PetscReal *size);
+/* Takes `size` and `terms` after HycoSystemGaps() from a compliance that tells them. */
+PetscErrorCode HycoSystemSizes(HycoSystem system, Vec x);
+/* The effect of rounding the terms of row k, if the compliance tells them. */
+PetscReal HycoSystemGapRounding(HycoSystem system, PetscInt k);
+/* The stationarity without K. */
+PetscErrorCode HycoSystemFreeStationarity(HycoSystem system, Vec L, PetscReal *value);
+/* How far gaps that are found in another way, as from displacements, are from those of the last residuals, relative to
+   their size, beyond round-off. */
+PetscErrorCode HycoSystemMisfit(HycoSystem system, const PetscReal gap[], PetscReal *misfit);
 
 /*
   A form: the unknowns in which the complementarity problem is posed, one file in impls/ each. Every solver has one
@@ -70,7 +110,8 @@ struct _HycoSolverFormOps {
 };
 struct _n_HycoSolverForm {
   char name[32];
-  PetscBool cones; /* trait: takes blocks of any cone; false: forces >= 0 only */
+  PetscBool cones;      /* trait: takes blocks of any cone; false: forces >= 0 only */
+  PetscBool compliance; /* trait: takes W */
   struct _HycoSolverFormOps ops[1];
   void *data;
 };
@@ -116,10 +157,10 @@ struct _p_HycoSolver {
   PetscBool iterative;
   PetscObjectId chosen_for;
   char linear_method[128], why_iterative[96];
-  Vec free;                   /* K^-1 F for the next solve, if known; borrowed */
-  const PetscBool *start_set; /* active set for the next solve, if given; borrowed */
-  Vec other;                  /* with blocks: a second start, if given; borrowed */
-  PetscReal target;           /* largest residual of the next solve without a factor; 0: by rtol alone */
+  Vec free;                     /* K^-1 F for the next solve, if known; borrowed */
+  const PetscBool *working_set; /* contacts of the next solve's first problem, if given; borrowed */
+  Vec other;                    /* with blocks: a second start, if given; borrowed */
+  PetscReal target;             /* largest residual of the next solve without a factor; 0: by rtol alone */
   /* the current attempt, or the last one */
   HycoSolverForm form;
   HycoMethod now;
@@ -146,7 +187,7 @@ PetscErrorCode HycoSolverFormCreate_Dual(HycoSolver s, HycoSolverForm form);
 PetscErrorCode HycoSolverFormCreate_Shell(HycoSolver s, HycoSolverForm form);
 PetscErrorCode HycoSolverFormCreate_Primal(HycoSolver s, HycoSolverForm form);
 PetscErrorCode HycoSolverFormCreate_Projected(HycoSolver s, HycoSolverForm form);
-PetscErrorCode HycoSolverFormCreate_Flexibility(HycoSolver s, HycoSolverForm form);
+PetscErrorCode HycoSolverFormCreate_Condensed(HycoSolver s, HycoSolverForm form);
 /* The form of that name, or NULL. */
 HycoSolverForm HycoSolverFindForm(HycoSolver s, const char name[]);
 /* The cheapest form that accepts the system with the current method; `stay` is preferred if it accepts. NULL: none,
@@ -202,8 +243,9 @@ PetscErrorCode HycoSolverSetFree(HycoSolver s, Vec x);
    (yes). This takes hundreds of times as long, and is unnecessary for an iteration whose final result is checked
    anyway. */
 PetscErrorCode HycoSolverSetRefine(HycoSolver s, PetscBool refine);
-/* The m contacts from which the active set of the next solve starts, with a given flexibility. Borrowed until then. */
-PetscErrorCode HycoSolverSetStartSet(HycoSolver s, const PetscBool active[]);
+/* The m contacts of the first problem of the next solve without K, from which the others join as they close. Borrowed
+   until then. */
+PetscErrorCode HycoSolverSetWorkingSet(HycoSolver s, const PetscBool in[]);
 /* Passes forces from which the next solve with blocks may start as well as from L: from those with the smaller
    residual. Borrowed until then. */
 PetscErrorCode HycoSolverSetOtherStart(HycoSolver s, Vec L);

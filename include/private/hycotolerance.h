@@ -29,6 +29,9 @@
 /* Of the friction mu r_n, by which a tangential force may miss the border of its cone: 100 times the tolerance of the
    residuals, 1e-8; nearer to it the contact slips, or may slip. */
 #define HYCO_CONE_BORDER 1e-6
+/* Of the largest gap without forces, a penetration: 450 eps, a row of B times the displacements; with less no contact
+   joins a problem. */
+#define HYCO_NO_PENETRATION 1e-13
 /* Of the gaps without forces, the most that is taken for round-off of the displacements: a body on a soft spring moves
    far and is pushed back as far; more is an error (tests/models/bodies.py). */
 #define HYCO_GAP_ROUND_OFF 1e-6

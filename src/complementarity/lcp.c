@@ -117,16 +117,23 @@ PetscErrorCode HycoLCPActiveSet(const HycoLCP *lcp, PetscBool active[], PetscRea
 }
 
 /* Else a body would be moved by as much as it takes to open a contact to which the motion is tangential. */
-void HycoMotionsRound(PetscInt p, PetscInt n, const PetscReal reach[], PetscReal M[])
+void HycoMotionRound(PetscInt n, PetscReal reach, PetscReal entry[])
+{
+  for (PetscInt j = 0; j < n; j++) reach = PetscMax(reach, PetscAbsReal(entry[j]));
+  for (PetscInt j = 0; j < n; j++) {
+    if (PetscAbsReal(entry[j]) <= TANGENTIAL * reach) entry[j] = 0;
+  }
+}
+
+void HycoMotionsRound(PetscInt p, PetscInt n, PetscReal M[])
 {
   const size_t size = (size_t)(p + n);
 
   for (size_t i = 0; i < (size_t)p; i++) {
-    PetscReal most = reach ? reach[i] : 1;
-
-    for (size_t j = (size_t)p; j < size; j++) most = PetscMax(most, PetscAbsReal(M[i * size + j]));
+    /* The pins move by 1. */
+    HycoMotionRound(n, 1, M + i * size + p);
     for (size_t j = (size_t)p; j < size; j++) {
-      if (PetscAbsReal(M[i * size + j]) <= TANGENTIAL * most) M[i * size + j] = M[j * size + i] = 0;
+      if (M[i * size + j] == 0) M[j * size + i] = 0;
     }
   }
 }

@@ -42,7 +42,7 @@ static PetscErrorCode RegisterForms(void)
   PetscCall(HycoSolverRegister("dual_free", HycoSolverFormCreate_Shell));
   PetscCall(HycoSolverRegister("projected", HycoSolverFormCreate_Projected));
   PetscCall(HycoSolverRegister("linear", HycoSolverFormCreate_Linear));
-  PetscCall(HycoSolverRegister("condensed", HycoSolverFormCreate_Flexibility));
+  PetscCall(HycoSolverRegister("condensed", HycoSolverFormCreate_Condensed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

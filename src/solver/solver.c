@@ -277,10 +277,12 @@ PetscBool HycoSolverNeedsSymmetry(HycoSolver s)
 PetscErrorCode HycoSolverNameMethod(HycoSolver s, const char form[])
 {
   PetscFunctionBegin;
-  if (s->now.traits & HYCO_TAO_OWN)
-    PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s %s", s->now.word, form));
-  else
-    PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s %s %s", s->now.word, s->now.type, form));
+  /* Not formatted, which costs as much as a part of a small prediction. */
+  PetscCall(PetscStrncpy(s->method, s->now.word, sizeof(s->method)));
+  for (int k = s->now.traits & HYCO_TAO_OWN ? 1 : 0; k < 2; k++) {
+    PetscCall(PetscStrlcat(s->method, " ", sizeof(s->method)));
+    PetscCall(PetscStrlcat(s->method, k ? form : s->now.type, sizeof(s->method)));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -312,6 +314,12 @@ static PetscErrorCode SetMethod(HycoSolver s, const Candidate *c)
 static PetscErrorCode SolverAccepts(HycoSolver s, HycoSolverForm form, PetscReal *cost, char why[HYCO_LINE])
 {
   PetscFunctionBegin;
+  if (s->system->W && !form->compliance) {
+    *cost = -1;
+    if (!why[0])
+      HycoFormat(why, "the form %s takes no compliance of the contacts, which this system has; use dual", form->name);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (s->system->blocks && s->system->m && !form->cones) {
     *cost = -1;
     /* The first form's reason is the most telling one. */
@@ -412,7 +420,7 @@ static PetscErrorCode SolverJudge(HycoSolver s, Vec x, Vec L, PetscBool solved)
 {
   PetscFunctionBegin;
   HycoLogged(HYCO_EVENT_KKT, HycoSystemComputeKKT(s->system, x, L, &s->kkt));
-  if (HycoKKTMax(&s->kkt) <= s->rtol)
+  if (s->system->beyond <= s->rtol)
     s->reason = HYCO_CONVERGED;
   else if (s->by_factor && !s->failure[0] && !(s->kkt.stationarity <= 1e-3))
     s->reason = HYCO_DIVERGED_SINGULAR; /* K x = r was solved with a large residual */
@@ -560,7 +568,8 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   if (s->system) HycoCheckHandle(s->system, HYCO_SYSTEM_CLASSID);
-  PetscCheck(s->system && (s->system->F || s->system->G), PETSC_COMM_SELF, PETSC_ERR_ORDER,
+  PetscCheck(s->system && (s->system->F || !s->system->n) && (s->system->K || s->system->W), PETSC_COMM_SELF,
+             PETSC_ERR_ORDER,
              "call HycoSolverSetSystem(), with a system whose matrices and vectors are set, before HycoSolverSolve()");
   PetscCall(HycoSystemCheckBlocks(s->system));
   /* A factor made ahead by HycoSolverFactor() belongs to this solve. */
@@ -577,7 +586,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   if (n_free) s->reason = lift_off ? HYCO_DIVERGED_FLOATING : HYCO_DIVERGED_HELD;
   /* What was passed for one solve ends here, whether or not it was used. */
   s->free = NULL;
-  s->start_set = NULL;
+  s->working_set = NULL;
   s->other = NULL;
   s->target = 0;
   s->seconds_solve = HycoNow() - begin - (s->seconds_factor - s->seconds_before);
@@ -624,11 +633,11 @@ PetscErrorCode HycoSolverSetFree(HycoSolver s, Vec x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The active set with which the next solve starts. Borrowed for one solve. */
-PetscErrorCode HycoSolverSetStartSet(HycoSolver s, const PetscBool active[])
+/* Not the same as a set to start from: what is not in it is not in the problem. Borrowed for one solve. */
+PetscErrorCode HycoSolverSetWorkingSet(HycoSolver s, const PetscBool in[])
 {
   PetscFunctionBegin;
-  s->start_set = active;
+  s->working_set = in;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -13,10 +13,10 @@ PetscErrorCode HycoSystemCreate(MPI_Comm comm, HycoSystem *system)
 }
 
 /* Created again from the new vectors, whose layout may differ. */
-static PetscErrorCode FreeWork(HycoSystem s)
+PetscErrorCode HycoSystemFreeWork(HycoSystem s)
 {
   PetscFunctionBegin;
-  HycoDestroyAll(&s->work_x[0], &s->work_x[1], &s->work_L);
+  HycoDestroyAll(&s->work_x[0], &s->work_x[1], &s->work_L, &s->work_W);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -24,9 +24,7 @@ static PetscErrorCode FreeWork(HycoSystem s)
 PetscErrorCode HycoSystemWork(HycoSystem s)
 {
   PetscFunctionBegin;
-  if (!s->work_x[0]) {
-    HycoVecDuplicate(s->F, &s->work_x[0], &s->work_x[1]);
-  }
+  if (s->F && !s->work_x[0]) HycoVecDuplicate(s->F, &s->work_x[0], &s->work_x[1]);
   if (s->m && !s->work_L) PetscCall(VecDuplicate(s->D, &s->work_L));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -39,10 +37,30 @@ PetscErrorCode HycoSystemDestroy(HycoSystem *system)
   PetscFunctionBegin;
   HycoDestroyBegin(system, HYCO_SYSTEM_CLASSID);
   s = *system;
-  HycoDestroyAll(&s->K, &s->Bt, &s->B, &s->G, &s->F, &s->D);
+  HycoDestroyAll(&s->K, &s->Bt, &s->B, &s->W, &s->F, &s->D);
   PetscCall(HycoBlocksDestroy(&s->blocks));
-  PetscCall(FreeWork(s));
+  PetscCall(HycoSystemFreeWork(s));
   PetscCall(PetscHeaderDestroy(system));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* K = 0: all x are free, and Bt is the transpose of B. */
+static PetscErrorCode SetFree(HycoSystem s, Mat B)
+{
+  PetscBool dense;
+  PetscInt lda = 0;
+
+  PetscFunctionBegin;
+  HycoCheckGiven(B);
+  PetscCall(PetscObjectTypeCompare((PetscObject)B, MATSEQDENSE, &dense));
+  if (dense) PetscCall(MatDenseGetLDA(B, &lda));
+  PetscCall(MatGetSize(B, &s->m, &s->n));
+  PetscCheck(dense && (lda == s->m || !s->m), PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG,
+             "without K, B must be dense on one process, without gaps");
+  PetscCall(PetscObjectReference((PetscObject)B));
+  HycoDestroyAll(&s->K, &s->B, &s->Bt, &s->W);
+  s->B = B;
+  s->symmetric = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -54,7 +72,10 @@ PetscErrorCode HycoSystemSetMatrices(HycoSystem s, Mat K, Mat Bt, Mat B, PetscBo
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SYSTEM_CLASSID);
-  HycoCheckGiven(K);
+  if (!K) {
+    PetscCall(SetFree(s, B));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(MatGetSize(K, &rows, &cols));
   PetscCheck(rows == cols, PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ, "K is %d x %d; it must be square", (int)rows, (int)cols);
   PetscCheck(!B == !Bt, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG, "B and Bt must both be given, or neither");
@@ -73,7 +94,7 @@ PetscErrorCode HycoSystemSetMatrices(HycoSystem s, Mat K, Mat Bt, Mat B, PetscBo
   }
   /* References first, then the old ones are given up: the new object may be the old one. */
   PetscCall(PetscObjectReference((PetscObject)K));
-  HycoDestroyAll(&s->K, &s->B, &s->Bt, &s->G);
+  HycoDestroyAll(&s->K, &s->B, &s->Bt, &s->W);
   s->K = K;
   s->B = B;
   s->Bt = Bt;
@@ -102,13 +123,14 @@ PetscErrorCode HycoSystemSetVectors(HycoSystem s, Vec F, Vec D)
   HycoCheckGiven(F);
   PetscCall(VecGetSize(F, &n));
   if (D) PetscCall(VecGetSize(D, &m));
-  PetscCheck(s->K, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoSystemSetMatrices() before HycoSystemSetVectors()");
+  PetscCheck(s->K || s->B, PETSC_COMM_SELF, PETSC_ERR_ORDER,
+             "call HycoSystemSetMatrices() before HycoSystemSetVectors()");
   PetscCheck(n == s->n && m == s->m, PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ,
              "F has length %d and D %d where %d and %d are expected", (int)n, (int)m, (int)s->n, (int)s->m);
   PetscCall(PetscObjectReference((PetscObject)F));
   if (D) PetscCall(PetscObjectReference((PetscObject)D));
   /* Work vectors have the layout of F and D. */
-  if (F != s->F || D != s->D) PetscCall(FreeWork(s));
+  if (F != s->F || D != s->D) PetscCall(HycoSystemFreeWork(s));
   HycoDestroyAll(&s->F, &s->D);
   s->F = F;
   s->D = D;
@@ -128,36 +150,6 @@ PetscErrorCode HycoSystemGetVectors(HycoSystem s, Vec *F, Vec *D)
   HycoCheckHandle(s, HYCO_SYSTEM_CLASSID);
   if (F) *F = s->F;
   if (D) *D = s->D;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* A system w = g + G L on one process: no displacements. G must be dense without gaps. */
-PetscErrorCode HycoSystemSetFlexibility(HycoSystem s, Mat G, Vec g)
-{
-  PetscInt rows, cols, m, lda = 0;
-  PetscBool dense;
-
-  PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SYSTEM_CLASSID);
-  HycoCheckGiven(G);
-  HycoCheckGiven(g);
-  PetscCall(PetscObjectTypeCompare((PetscObject)G, MATSEQDENSE, &dense));
-  PetscCall(MatGetSize(G, &rows, &cols));
-  PetscCall(VecGetSize(g, &m));
-  if (dense) PetscCall(MatDenseGetLDA(G, &lda));
-  /* BLAS and the factor of the set take the array as it lies. */
-  PetscCheck(dense && lda == rows && rows == cols && m == rows, PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ,
-             "G is %d x %d and g has length %d; G must be dense on one process, square, and g as long", (int)rows,
-             (int)cols, (int)m);
-  PetscCall(PetscObjectReference((PetscObject)G));
-  PetscCall(PetscObjectReference((PetscObject)g));
-  HycoDestroyAll(&s->K, &s->B, &s->Bt, &s->G, &s->F, &s->D);
-  PetscCall(FreeWork(s));
-  s->G = G;
-  s->D = g;
-  s->symmetric = PETSC_TRUE;
-  s->n = 0;
-  s->m = m;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -183,7 +175,7 @@ static PetscErrorCode CountRows(HycoSystem s, PetscInt *rows)
 {
   PetscFunctionBegin;
   *rows = 0;
-  if (s->G || s->B) PetscCall(MatGetLocalSize(s->G ? s->G : s->B, rows, NULL));
+  if (s->W || s->B) PetscCall(MatGetLocalSize(s->W ? s->W : s->B, rows, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -197,7 +189,7 @@ PetscErrorCode HycoSystemSetBlocks(HycoSystem s, PetscInt n_cones, const HycoCon
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SYSTEM_CLASSID);
-  PetscCheck(!n_cones || s->K || s->G, PETSC_COMM_SELF, PETSC_ERR_ORDER,
+  PetscCheck(!n_cones || s->K || s->W, PETSC_COMM_SELF, PETSC_ERR_ORDER,
              "call HycoSystemSetMatrices() or HycoSystemSetFlexibility() before HycoSystemSetBlocks()");
   PetscCall(CountRows(s, &rows));
   if (n_cones) HycoOnEach(HycoComm(s), CheckCover(n_cones, cones, n_blocks, cone_of, data, rows));
@@ -412,124 +404,138 @@ static PetscErrorCode BlockKKT(HycoSystem s, const PetscReal w[], const PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The residuals of w = g + G L. Equilibrium has no residual here: it is satisfied by the definition of G. On one
-   process. */
-static PetscErrorCode FlexibilityKKT(HycoSystem s, Vec L, HycoKKT *kkt)
+/* What stands for the size of the forces where there are none: the loads, or the gap over the largest flexibility. */
+static PetscErrorCode InsteadOfForces(HycoSystem s, PetscReal *force)
 {
-  const PetscInt m = s->m;
-  PetscReal size = 0, most = 0, stiffest = 0, worst[3] = {0, 0, 0};
-  const PetscScalar *G, *g, *l;
-  PetscScalar *w;
+  Vec diagonal;
+  PetscReal size;
 
   PetscFunctionBegin;
-  if (!s->work_L) PetscCall(VecDuplicate(s->D, &s->work_L));
-  PetscCall(VecSet(s->work_L, 0));
-  PetscCall(MatDenseGetArrayRead(s->G, &G));
-  PetscCall(VecGetArrayRead(s->D, &g));
-  PetscCall(VecGetArrayRead(L, &l));
-  PetscCall(VecGetArray(s->work_L, &w));
-  for (PetscInt j = 0; j < m; j++) { /* few forces are nonzero */
-    const PetscScalar *column = G + (size_t)j * (size_t)m;
-
-    most = PetscMax(most, PetscAbsReal(l[j]));
-    for (PetscInt i = 0; l[j] != 0 && i < m; i++) w[i] += column[i] * l[j];
+  if (s->F) {
+    PetscCall(VecNorm(s->F, NORM_INFINITY, &size));
+    *force = s->size_B > 0 ? size / s->size_B : 0;
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
-  for (PetscInt i = 0; i < m; i++) {
-    /* The terms of which a gap is the difference. */
-    size = PetscMax(size, PetscMax(PetscAbsReal(g[i]), PetscAbsReal(w[i])));
-    w[i] += g[i];
-    if (!(PetscAbsReal(w[i]) <= PETSC_MAX_REAL) || !(PetscAbsReal(l[i]) <= PETSC_MAX_REAL)) /* or NaN */
-      worst[2] = PETSC_MAX_REAL;
-  }
-  for (PetscInt i = 0; i < m; i++) {
-    worst[0] = PetscMax(worst[0], -w[i]);
-    worst[1] = PetscMax(worst[1], -l[i]);
-    if (l[i] != 0 && size > 0)
-      worst[2] = PetscMax(worst[2], PetscAbsReal(w[i] / size * (l[i] / most))); /* avoids overflow */
-  }
-  kkt->penetration = worst[0] > 0 ? worst[0] / size : 0;
-  kkt->adhesion = worst[1] > 0 ? worst[1] / most : 0;
-  kkt->complementarity = worst[2];
-  for (PetscInt i = 0; s->blocks && i < m; i++) stiffest = PetscMax(stiffest, G[(size_t)i * (size_t)m + (size_t)i]);
-  /* Without any force the gap over the stiffest flexibility is the scale of forces. */
-  if (s->blocks) PetscCall(BlockKKT(s, w, l, size, most, SystemQuotient(size, stiffest), kkt));
-  PetscCall(VecRestoreArray(s->work_L, &w));
-  PetscCall(VecRestoreArrayRead(L, &l));
-  PetscCall(VecRestoreArrayRead(s->D, &g));
-  PetscCall(MatDenseRestoreArrayRead(s->G, &G));
+  PetscCall(VecDuplicate(s->D, &diagonal));
+  PetscCall(MatGetDiagonal(s->W, diagonal));
+  PetscCall(VecMax(diagonal, NULL, &size));
+  PetscCall(VecDestroy(&diagonal));
+  *force = SystemQuotient(s->size, size);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The blocks' residuals with the gaps in `gap`; where there are no forces, the loads give their size. */
-static PetscErrorCode GapKKT(HycoSystem s, Vec gap, Vec L, PetscReal size_gap, PetscReal size_L, HycoKKT *kkt)
+PetscErrorCode HycoSystemGaps(HycoSystem s, Vec x, Vec L, Vec w)
 {
-  PetscReal load;
-  const PetscScalar *w, *l;
+  PetscBool same;
+  PetscReal size_x = 0, size_D = 0;
 
   PetscFunctionBegin;
-  /* The loads stand for the forces that are missing. */
-  PetscCall(VecNorm(s->F, NORM_INFINITY, &load));
+  s->size = 0;
+  if (s->n) {
+    PetscCall(MatMult(s->B, x, w));
+    PetscCall(VecAYPX(w, -1, s->D));
+    /* The norm of B is computed once per B. */
+    PetscCall(HycoOperatorStateUpdate(&s->seen_B, s->B, NULL, &same));
+    if (!same) PetscCall(MatNorm(s->B, NORM_INFINITY, &s->size_B));
+    PetscCall(VecNorm(x, NORM_INFINITY, &size_x));
+    /* The size of the terms of D - B x, whose cancellation limits what any solver can reach. */
+    s->size = s->size_B * size_x;
+  } else
+    PetscCall(VecCopy(s->D, w));
+  if (s->K) PetscCall(VecNorm(s->D, NORM_INFINITY, &size_D));
+  s->size = PetscMax(size_D, s->size);
+  if (s->W) PetscCall(HycoSystemAddCompliance(s, L, w, &s->size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* On one process there is nothing to exchange, not even with MPI's functions. */
+PetscErrorCode HycoSystemMost(HycoSystem s, PetscMPIInt n, PetscReal value[])
+{
+  PetscFunctionBegin;
+  if (HycoSize(HycoComm(s)) > 1) HycoAllreduce(value, n, MPIU_REAL, MPI_MAX, HycoComm(s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Penetration, adhesion and complementarity of forces >= 0 with the gaps in `gap`; *beyond: the largest without the
+   effect of rounding the terms of the gaps. Quotients first: products may overflow. */
+static PetscErrorCode SystemSigns(HycoSystem s, Vec gap, Vec L, PetscReal size_L, HycoKKT *kkt, PetscReal *beyond)
+{
+  const PetscScalar *w, *l;
+  PetscInt m;
+  PetscReal worst[4] = {0, 0, 0, 0};
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(gap, &m));
   PetscCall(VecGetArrayRead(gap, &w));
   PetscCall(VecGetArrayRead(L, &l));
-  PetscCall(BlockKKT(s, w, l, size_gap, size_L, s->size_B > 0 ? load / s->size_B : 0, kkt));
+  for (PetscInt i = 0; i < m; i++) {
+    /* Of a row that cannot close, a force alone is wrong. */
+    const PetscBool open = (PetscBool)(w[i] >= PETSC_INFINITY);
+    const PetscReal left = open ? 1 : w[i] == 0 ? 0 : w[i] / s->size, share = l[i] == 0 ? 0 : l[i] / size_L;
+    PetscReal more = PetscAbsReal(left);
+
+    if (!open && !(PetscAbsReal(left * share) <= PETSC_MAX_REAL)) worst[2] = PETSC_MAX_REAL; /* or NaN */
+    worst[0] = PetscMax(worst[0], -left);
+    worst[1] = PetscMax(worst[1], -share);
+    worst[2] = PetscMax(worst[2], PetscAbsReal(left * share));
+    if (s->terms && !open) more = PetscMax(more - HycoSystemGapRounding(s, i) / s->size, 0);
+    worst[3] = PetscMax(worst[3], more * (left < 0 ? 1 : PetscAbsReal(share)));
+  }
   PetscCall(VecRestoreArrayRead(gap, &w));
   PetscCall(VecRestoreArrayRead(L, &l));
+  PetscCall(HycoSystemMost(s, 4, worst));
+  kkt->penetration = worst[0];
+  kkt->adhesion = worst[1];
+  kkt->complementarity = worst[2];
+  *beyond = PetscMax(worst[3], worst[1]);
+  if (worst[2] >= PETSC_MAX_REAL) *beyond = PETSC_MAX_REAL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The four KKT residuals of x and L, recomputed from K, B, F, D (none is taken from a solver): stationarity,
+/* The residuals of the contacts at the gaps, with or without blocks. */
+static PetscErrorCode SystemContacts(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
+{
+  const PetscScalar *w, *l;
+  PetscReal size_L, instead = 0, beyond = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSystemGaps(s, x, L, s->work_L));
+  PetscCall(HycoSystemSizes(s, x));
+  PetscCall(VecNorm(L, NORM_INFINITY, &size_L));
+  if (!s->blocks) {
+    PetscCall(SystemSigns(s, s->work_L, L, size_L, kkt, &beyond));
+    s->beyond = PetscMax(kkt->stationarity, s->terms ? beyond : HycoKKTMax(kkt));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (!(size_L > 0)) PetscCall(InsteadOfForces(s, &instead));
+  PetscCall(VecGetArrayRead(s->work_L, &w));
+  PetscCall(VecGetArrayRead(L, &l));
+  PetscCall(BlockKKT(s, w, l, s->size, size_L, instead, kkt));
+  PetscCall(VecRestoreArrayRead(s->work_L, &w));
+  PetscCall(VecRestoreArrayRead(L, &l));
+  s->beyond = HycoKKTMax(kkt);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The four KKT residuals of x and L, recomputed from K, B, F, D, W (none is taken from a solver): stationarity,
    penetration, negative forces, complementarity, each relative. Collective. */
 PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
 {
-  Vec gap;
-  PetscBool same;
-  const PetscScalar *w, *l;
-  PetscInt m;
-  PetscReal local[3] = {0, 0, 0}, worst[3], size_x, size_D, size_L, size_gap;
-
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SYSTEM_CLASSID);
   HycoCheckGiven(kkt);
   PetscCall(PetscMemzero(kkt, sizeof(*kkt)));
   PetscCall(HycoSystemCheckBlocks(s));
-  if (s->G) {
-    PetscCall(FlexibilityKKT(s, L, kkt));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCheck(s->F, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoSystemSetVectors() before HycoSystemComputeKKT()");
+  PetscCheck(s->F || (s->W && !s->n), PETSC_COMM_SELF, PETSC_ERR_ORDER,
+             "call HycoSystemSetVectors() before HycoSystemComputeKKT()");
   PetscCall(HycoSystemWork(s));
-  PetscCall(SystemStationarity(s, x, L, &kkt->stationarity, &kkt->rounding));
+  if (s->K)
+    PetscCall(SystemStationarity(s, x, L, &kkt->stationarity, &kkt->rounding));
+  else if (s->n)
+    PetscCall(HycoSystemFreeStationarity(s, L, &kkt->stationarity));
   if (PetscIsInfOrNanReal(kkt->stationarity)) kkt->stationarity = PETSC_MAX_REAL;
-  if (!s->m) PetscFunctionReturn(PETSC_SUCCESS);
-  gap = s->work_L;
-  PetscCall(MatMult(s->B, x, gap));
-  PetscCall(VecAYPX(gap, -1, s->D));
-  /* The norm of B is computed once per B. */
-  PetscCall(HycoOperatorStateUpdate(&s->seen_B, s->B, NULL, &same));
-  if (!same) PetscCall(MatNorm(s->B, NORM_INFINITY, &s->size_B));
-  PetscCall(VecNorm(x, NORM_INFINITY, &size_x));
-  PetscCall(VecNorm(s->D, NORM_INFINITY, &size_D));
-  PetscCall(VecNorm(L, NORM_INFINITY, &size_L));
-  /* The size of the terms of D - B x, whose cancellation limits what any solver can reach. */
-  size_gap = PetscMax(size_D, s->size_B * size_x);
-  if (s->blocks) {
-    PetscCall(GapKKT(s, gap, L, size_gap, size_L, kkt));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(VecGetLocalSize(gap, &m));
-  PetscCall(VecGetArrayRead(gap, &w));
-  PetscCall(VecGetArrayRead(L, &l));
-  for (PetscInt i = 0; i < m; i++) {
-    local[0] = PetscMax(local[0], -w[i]);
-    local[1] = PetscMax(local[1], -l[i]);
-    local[2] = PetscMax(local[2], PetscAbsReal(w[i] * l[i]));
-  }
-  PetscCall(VecRestoreArrayRead(gap, &w));
-  PetscCall(VecRestoreArrayRead(L, &l));
-  PetscCallMPI(MPI_Allreduce(local, worst, 3, MPIU_REAL, MPI_MAX, HycoComm(s)));
-  kkt->penetration = SystemQuotient(worst[0], size_gap);
-  kkt->adhesion = SystemQuotient(worst[1], size_L);
-  kkt->complementarity = SystemQuotient(worst[2], size_gap * size_L);
+  s->beyond = kkt->stationarity;
+  if (s->m) PetscCall(SystemContacts(s, x, L, kkt));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -547,6 +553,7 @@ PetscErrorCode HycoSystemView(HycoSystem s, PetscViewer viewer)
   PetscCall(PetscViewerPushFormat(viewer, PETSC_VIEWER_ASCII_INFO));
   if (s->K) PetscCall(MatView(s->K, viewer));
   if (s->B && s->m) PetscCall(MatView(s->B, viewer));
+  if (s->W) PetscCall(MatView(s->W, viewer));
   PetscCall(PetscViewerPopFormat(viewer));
   PetscCall(PetscViewerASCIIPopTab(viewer));
   PetscFunctionReturn(PETSC_SUCCESS);

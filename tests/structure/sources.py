@@ -101,6 +101,14 @@ class Sources(unittest.TestCase):
             names = re.findall(r'#include\s*[<"](\w+)\.h[>"]', text(path))
             self.assertEqual([n for n in names if n in above], [], name)
 
+    def test_one_solver(self):
+        """Every contact problem is a contact system solved by HycoSolver: nothing else in the library calls the dense problem's solver, but what is not yet
+        moved, a list that only gets shorter."""
+        waiting = {'src/rom/impls/bodies/bodies_friction.c'}
+        own = {'src/complementarity/tao.c', 'src/complementarity/tao_nnls.c', 'src/solver/impls/condensed/condensed.c', 'src/solver/impls/dual/dual.c'}
+        found = {os.path.relpath(path, SOURCE) for path in sources() if re.search(r'\bHyco(TaoSolveLCP|LCP(ActiveSet|Semidefinite|Proximal|Lemke|Semismooth)) *\(', code(path))}
+        self.assertEqual({path for path in found if not path.startswith('src/complementarity/')} | own, own | waiting)
+
     def test_command(self):
         """The command includes public headers and its own alone."""
         public = {os.path.basename(path) for path in glob.glob(os.path.join(SOURCE, 'include', '*.h'))}

@@ -98,3 +98,44 @@ PetscErrorCode HycoBodiesMoveMotions(HycoBodiesWork o, const HycoBodiesSurface *
   PetscCall(PetscFree(rigid));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+/* -- the work of the loads -- */
+
+/* Of the terms of a load's work, their sum: the coefficients carry the interpolation of the loads, whose residual is
+   INDEPENDENT_LOAD. */
+#define CANCELS 1e-11
+
+/* The work of the loads on motion i; 0 where vectors of the basis cancel, as it is of a load that does not act on
+   it. */
+PetscReal HycoBodiesLoadWork(HycoBodiesWork o, PetscInt i)
+{
+  const PetscInt r = o->bodies->r;
+  PetscReal sum = 0, terms = 0;
+
+  for (PetscInt j = 0; j < r; j++) {
+    const PetscReal term = o->work[i * r + j] * o->c[j];
+
+    sum += term;
+    terms += PetscAbsReal(term);
+  }
+  return PetscAbsReal(sum) > CANCELS * terms ? sum : 0;
+}
+
+/* The round-off of these works: loads that balance themselves leave it beside the work of tiny ones. */
+PetscReal HycoBodiesLoadRounding(HycoBodiesWork o)
+{
+  const HycoSubstructures b = o->bodies;
+  PetscReal all = 0, most = 0;
+
+  for (PetscInt j = 0; j < b->r; j++) all += PetscAbsReal(o->c[j]);
+  for (PetscInt i = 0; i < b->p * b->r; i++) most = PetscMax(most, PetscAbsReal(o->work[i]));
+  return HYCO_WORK_ROUND_OFF * most * all;
+}
+
+PetscBool HycoBodiesLoaded(HycoBodiesWork o)
+{
+  PetscReal all = 0;
+
+  for (PetscInt j = 0; j < o->bodies->r; j++) all += PetscAbsReal(o->c[j]);
+  return (PetscBool)(all > 0);
+}

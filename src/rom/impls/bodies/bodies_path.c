@@ -54,7 +54,7 @@ static PetscErrorCode BodiesPathState(HycoROM m, PetscReal t0, PetscReal t1, con
     PetscCall(HycoBodiesStrain(&w->bodies, &w->surface, alpha));
     HycoBodiesDisplacementsOfForces(&w->bodies, &w->surface, Lambda);
     MoveAll(m);
-    residual = HycoBodiesMeasure(m, &p->kkt);
+    PetscCall(HycoBodiesMeasure(m, PETSC_FALSE, &p->kkt, &residual));
   }
   /* Equilibrium holds by condensation, but for rigid motions; what is left of it is Newton's residual of alpha. */
   p->kkt.stationarity = PetscMax(p->kkt.stationarity, a->residual);

@@ -6,22 +6,17 @@
 */
 #include <hycoalgorithms.h>
 #include <hycobodies.h>
-#include <hycotao.h>
 #include <petscblaslapack.h>
 #include <string.h>
 
-#define ROUNDS 60 /* of joining contacts */
 /* Of the deepest penetration without forces: contacts that are deeper are in the first problem; half, as the others
    join in a round or two. */
-#define FIRST_DEPTH    0.5
-#define NO_PENETRATION 1e-13 /* of the largest gap: 450 eps, a row of B times the displacements */
+#define FIRST_DEPTH 0.5
 /* Of the differences of depth, where all contacts are closed without forces: the nearest tenth is in the first problem
    (391 contacts, of which 9 to 87 closed, were all). */
 #define NEAREST_DEPTH 0.1
 /* Of the depth: 4.5e6 eps; smaller differences of depth do not choose the first problem. */
-#define FLAT_DEPTH    1e-9
-#define COARSE_STRIDE 4  /* one of so many contacts is in the first problem of bodies that contact alone holds */
-#define SMALL_PROBLEM 64 /* contacts that are all in it */
+#define FLAT_DEPTH 1e-9
 
 /* `weight`, `share` and `blend` hold one array per body, and `bodies` has their number; the zeros afterwards make a
    second call, and HycoBodiesSetUp() on the same work, safe. */
@@ -30,7 +25,7 @@ PetscErrorCode HycoBodiesReset(HycoBodiesWork o)
   PetscFunctionBegin;
   PetscCall(HycoBodiesResetRowCache(o));
   PetscCall(HycoFEDestroy(&o->fe));
-  PetscCall(HycoTaoDestroy(&o->tao));
+  PetscCall(HycoBodiesDestroySystem(o));
   PetscCall(HycoSolverDestroy(&o->own));
   PetscCall(HycoBodiesResetPerturbed(o));
   for (PetscInt k = 0; o->R && k < o->bodies->n; k++)
@@ -276,10 +271,7 @@ PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene 
   PetscCall(GrowRows(o, HycoPairsWidth(s->pairs) * b->dim * m * b->dim + 1));
   PetscCall(PetscMalloc1(m + 1, &o->gap));
   PetscCall(PetscMalloc1(m + 1, &o->active));
-  PetscCall(HycoTaoCreate(PETSC_COMM_SELF, NULL, &o->tao));
-  /* Beside the solver of contact systems: the active set works on the dense M itself, and takes the rigid motions,
-     which a flexibility alone does not have. */
-  PetscCall(HycoTaoSetType(o->tao, HYCO_TAO_ACTIVE_SET, o->solver->max_its));
+  PetscCall(HycoBodiesCreateSystem(o));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -369,45 +361,6 @@ static PetscErrorCode BodiesSolveLoad(HycoBodiesWork o)
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Of the terms of a load's work, their sum: the coefficients carry the interpolation of the loads, whose residual is
-   INDEPENDENT_LOAD. */
-#define CANCELS 1e-11
-
-/* The work of the loads on motion i; 0 where vectors of the basis cancel, as it is of a load that does not act on
-   it. */
-PetscReal HycoBodiesLoadWork(HycoBodiesWork o, PetscInt i)
-{
-  const PetscInt r = o->bodies->r;
-  PetscReal sum = 0, terms = 0;
-
-  for (PetscInt j = 0; j < r; j++) {
-    const PetscReal term = o->work[i * r + j] * o->c[j];
-
-    sum += term;
-    terms += PetscAbsReal(term);
-  }
-  return PetscAbsReal(sum) > CANCELS * terms ? sum : 0;
-}
-
-/* The round-off of these works: loads that balance themselves leave it beside the work of tiny ones. */
-PetscReal HycoBodiesLoadRounding(HycoBodiesWork o)
-{
-  const HycoSubstructures b = o->bodies;
-  PetscReal all = 0, most = 0;
-
-  for (PetscInt j = 0; j < b->r; j++) all += PetscAbsReal(o->c[j]);
-  for (PetscInt i = 0; i < b->p * b->r; i++) most = PetscMax(most, PetscAbsReal(o->work[i]));
-  return HYCO_WORK_ROUND_OFF * most * all;
-}
-
-PetscBool HycoBodiesLoaded(HycoBodiesWork o)
-{
-  PetscReal all = 0;
-
-  for (PetscInt j = 0; j < o->bodies->r; j++) all += PetscAbsReal(o->c[j]);
-  return (PetscBool)(all > 0);
 }
 
 /* The rigid motions at mu, and the work of the loads on them. */
@@ -529,247 +482,6 @@ static PetscErrorCode TakeWeights(HycoBodiesWork o, const PetscReal mu[], PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The column of an unknown of body k in its flexibility, without kappa; made when it is needed for the first time. */
-static PetscErrorCode GetColumn(HycoBodiesWork o, PetscInt k, PetscInt unknown, const PetscReal **column)
-{
-  const HycoSubstructure *own = &o->bodies->body[k];
-  const size_t n = (size_t)own->n, at = (size_t)unknown * n;
-  PetscBool *there = &o->blended[o->bodies->start[k] + unknown];
-
-  PetscFunctionBegin;
-  *column = own->C.wide + at;
-  if (own->n_samples == 1) PetscFunctionReturn(PETSC_SUCCESS);
-  /* All n x n at first use, each column filled only on demand: most columns belong to unknowns that no closed
-     contact reads. */
-  if (!o->blend[k]) PetscCall(PetscMalloc1(n * n, &o->blend[k]));
-  if (!*there) {
-    HycoFlexibilityColumn(&own->C, o->share[k], unknown, o->blend[k] + at);
-    *there = PETSC_TRUE;
-  }
-  *column = o->blend[k] + at;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* -- the complementarity problem of some contacts -- */
-
-/* The contacts in the problem. */
-typedef struct {
-  PetscInt n, *contact;
-  PetscReal *M, *q, *z;
-} Problem;
-
-/* o->response of a contact: C row^T of each body that its row touches, without kappa. Made once at the present
-   parameters: further problems, and the displacements, take it from there. */
-static PetscErrorCode BodiesSolveRespond(HycoBodiesWork o, PetscInt contact)
-{
-  const HycoSubstructures b = o->bodies;
-  PetscReal **response = o->response + contact * b->n;
-
-  PetscFunctionBegin;
-  if (o->responded[contact]) PetscFunctionReturn(PETSC_SUCCESS);
-  o->responded[contact] = PETSC_TRUE;
-  for (PetscInt k = 0; k < b->n; k++) {
-    const PetscInt lo = b->start[k], hi = b->start[k + 1];
-    PetscBool touched = PETSC_FALSE;
-
-    for (PetscInt e = o->row_start[contact]; e < o->row_start[contact + 1]; e++) {
-      const PetscReal *column;
-
-      if (o->row_at[e] < lo || o->row_at[e] >= hi) continue;
-      if (!response[k]) PetscCall(PetscMalloc1(hi - lo, &response[k]));
-      PetscCall(GetColumn(o, k, o->row_at[e] - lo, &column));
-      for (PetscInt i = 0; i < hi - lo && !touched; i++) response[k][i] = o->row[e] * column[i];
-      if (touched) HycoBodiesAdd(hi - lo, o->row[e], column, response[k]);
-      touched = PETSC_TRUE;
-    }
-    /* At other parameters it touched this body. */
-    if (!touched) PetscCall(PetscFree(response[k]));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* row[j] = W of the contact with those in the problem from number `first` on. */
-static PetscErrorCode FillRow(HycoBodiesWork o, Problem *p, PetscInt first, PetscReal row[])
-{
-  const HycoSubstructures b = o->bodies;
-
-  PetscFunctionBegin;
-  if (o->kept.same) {
-    HycoBodiesRowCacheGet(o, p->contact[first], p->n - first, p->contact + first, row);
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(BodiesSolveRespond(o, p->contact[first]));
-  for (PetscInt k = 0; k < b->n; k++) {
-    const PetscReal *y = o->response[p->contact[first] * b->n + k], scale = 1 / o->kappa[k];
-    const PetscInt lo = b->start[k], hi = b->start[k + 1];
-
-    /* Only the upper triangle: W is symmetric, and the caller mirrors it. */
-    for (PetscInt j = 0; y && j < p->n - first; j++) {
-      const PetscInt contact = p->contact[first + j];
-      PetscReal sum = 0;
-
-      for (PetscInt e = o->row_start[contact]; e < o->row_start[contact + 1]; e++) {
-        if (o->row_at[e] >= lo && o->row_at[e] < hi) sum += o->row[e] * y[o->row_at[e] - lo];
-      }
-      row[j] += scale * sum;
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* M = [0 A; -A^T W] and q = (-work, w) of the contacts in the problem. */
-static PetscErrorCode BodiesSolveFill(HycoBodiesWork o, Problem *p)
-{
-  const HycoSubstructures b = o->bodies;
-  const size_t n = (size_t)(b->p + p->n);
-  PetscReal *reach;
-
-  PetscFunctionBegin;
-  /* May turn kept.same off (memory). */
-  PetscCall(HycoBodiesKeep(o, p->n, p->contact));
-  PetscCall(PetscCalloc1(n * n + 1, &p->M));
-  PetscCall(PetscCalloc2(n + 1, &p->q, n + 1, &p->z));
-  for (PetscInt i = 0; i < b->p; i++) p->q[i] = -HycoBodiesLoadWork(o, i);
-  for (PetscInt k = 0; k < p->n; k++) {
-    const PetscInt contact = p->contact[k];
-    const size_t column = (size_t)(b->p + k);
-
-    p->q[column] = o->gap[contact];
-    PetscCall(FillRow(o, p, k, p->M + column * n + column));
-    /* FillRow() computes row k from the diagonal on; W is symmetric, and copying keeps it so to the last digit. */
-    for (size_t j = column; j < n; j++) p->M[j * n + column] = p->M[column * n + j];
-    for (PetscInt i = 0; i < b->p; i++) {
-      PetscReal sum = 0;
-
-      for (PetscInt e = o->row_start[contact]; e < o->row_start[contact + 1]; e++)
-        sum += o->row[e] * o->Z[o->row_at[e] * b->p + i];
-      p->M[column * n + (size_t)i] = sum;
-      p->M[(size_t)i * n + column] = -sum;
-    }
-  }
-  PetscCall(PetscCalloc1(b->p + 1, &reach));
-  for (PetscInt i = 0; i < b->p * b->ns; i++) reach[i % b->p] = PetscMax(reach[i % b->p], PetscAbsReal(o->Z[i]));
-  HycoMotionsRound(b->p, p->n, reach, p->M);
-  PetscCall(PetscFree(reach));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* By the solver of contact systems: another method than the active set, or if that fails, the next ones. o->active is
-   the start; p->z receives the forces. */
-static PetscErrorCode SolveSystem(HycoBodiesWork o, Problem *p, PetscBool *solved)
-{
-  HycoSystem system;
-  Mat G;
-  Vec g, L;
-  PetscInt its;
-  const char *method;
-
-  PetscFunctionBegin;
-  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, p->n, p->n, p->M, &G));
-  PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, p->n, p->q, &g));
-  PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, p->n, p->z, &L));
-  PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &system));
-  /* Without rigid motions M is W alone, so that p->M, q and z serve as arrays of the PETSc objects (borrowed). */
-  PetscCall(HycoSystemSetFlexibility(system, G, g));
-  PetscCall(HycoSolverSetSystem(o->solver, system));
-  PetscCall(HycoSolverSetStartSet(o->solver, o->active));
-  PetscCall(HycoSolverSolve(o->solver, NULL, L));
-  PetscCall(HycoSolverGetReason(o->solver, &o->reason));
-  PetscCall(HycoSolverGetIterations(o->solver, &its));
-  PetscCall(HycoSolverGetMethod(o->solver, &method));
-  PetscCall(PetscStrncpy(o->method, method, sizeof(o->method)));
-  o->its += its;
-  *solved = (PetscBool)(o->reason > 0);
-  HycoDestroyAll(&system, &L, &g, &G);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* By the active set from all closed, which alone solves problems with rigid motions. */
-static PetscErrorCode SolveSet(HycoBodiesWork o, Problem *p, PetscBool *solved)
-{
-  const HycoLCP lcp = {.n = p->n, .p = o->bodies->p, .M = p->M, .q = p->q, .symmetric = PETSC_TRUE};
-  PetscInt its = 0;
-
-  PetscFunctionBegin;
-  PetscCall(HycoTaoSolveLCP(o->tao, &lcp, o->active, p->z, &its, solved));
-  PetscCall(PetscStrncpy(o->method, HYCO_SOLVER_ACTIVE_SET, sizeof(o->method)));
-  o->reason = *solved ? HYCO_CONVERGED : HYCO_DIVERGED_RESIDUAL;
-  o->its += its;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Frees what BodiesSolveFill() made. */
-static PetscErrorCode BodiesSolveRelease(Problem *p)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscFree(p->M));
-  PetscCall(PetscFree2(p->q, p->z));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* One problem with the contacts of p. The start is all closed: most contacts of the problem are, and with rigid
-   motions the first matrix would be singular otherwise. Lambda of contacts outside p stays as it is, 0. */
-static PetscErrorCode SolveProblem(HycoBodiesWork o, Problem *p, PetscReal Lambda[], PetscBool *solved)
-{
-  const HycoSubstructures b = o->bodies;
-  const PetscBool set = (PetscBool)!strcmp(HycoSolverTypes[o->solver->type], HYCO_SOLVER_ACTIVE_SET);
-
-  PetscFunctionBegin;
-  HycoCheckModel(
-      set || !b->p,
-      "-hyco_solver_type: contact alone holds a body, and a model of bodies solves such problems by active_set");
-  PetscCall(BodiesSolveFill(o, p));
-  for (PetscInt k = 0; k < p->n; k++) o->active[k] = PETSC_TRUE;
-  /* The active set may cycle (W need not be an M-matrix); the solver's other methods then take over if its
-     fallback is allowed. */
-  *solved = PETSC_FALSE;
-  if (set) PetscCall(SolveSet(o, p, solved));
-  if (!*solved && !b->p && (!set || o->solver->fallback)) PetscCall(SolveSystem(o, p, solved));
-  for (PetscInt i = 0; i < b->p; i++) o->x[i] = p->z[i];
-  for (PetscInt k = 0; k < p->n; k++) /* negative by round-off; the residuals are recomputed */
-    Lambda[p->contact[k]] = b->p && !o->active[k] ? 0 : PetscMax(p->z[b->p + k], 0);
-  PetscCall(BodiesSolveRelease(p));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* For derivatives, which need the same matrix as the solve, on the contacts that may touch. */
-PetscErrorCode HycoBodiesMatrix(HycoBodiesWork o, PetscInt n, const PetscInt contact[], PetscReal M[])
-{
-  const size_t size = (size_t)(o->bodies->p + n);
-  Problem p = {.n = n};
-
-  PetscFunctionBegin;
-  HycoDuplicate(n, contact, &p.contact);
-  PetscCall(BodiesSolveFill(o, &p));
-  /* As [0 Z^T B^T; -B Z W]: the motions come before the contacts, as in z. */
-  PetscCall(PetscArraycpy(M, p.M, size * size));
-  PetscCall(BodiesSolveRelease(&p));
-  PetscCall(PetscFree(p.contact));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoBodiesAddCompliance(HycoBodiesWork o, const PetscReal f[], PetscReal to[])
-{
-  const HycoSubstructures b = o->bodies;
-
-  PetscFunctionBegin;
-  for (PetscInt k = 0; k < b->n; k++) {
-    const HycoSubstructure *own = &b->body[k];
-    PetscReal *u = to + b->start[k];
-
-    for (PetscInt j = 0; j < own->n; j++) {
-      const PetscReal force = f[b->start[k] + j] / o->kappa[k];
-
-      const PetscReal *column;
-
-      if (force == 0) continue;
-      PetscCall(GetColumn(o, k, j, &column));
-      HycoBodiesAdd(own->n, -force, column, u);
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* u += Z x. */
 static void MoveRigidly(HycoBodiesWork o)
 {
@@ -803,37 +515,10 @@ static PetscErrorCode BodiesSolveDisplace(HycoBodiesWork o, const HycoBodiesSurf
     for (PetscInt j = o->row_start[k]; Lambda[k] != 0 && j < o->row_start[k + 1]; j++)
       o->f[o->row_at[j]] += o->row[j] * Lambda[k];
   }
-  PetscCall(PetscArraycpy(o->u, o->free, b->ns));
-  /* Kept products P = C B^T give u, or those at the present parameters. */
-  if (o->kept.same) PetscCall(HycoBodiesRowCacheDisplace(o, s->n, Lambda, o->u));
-  for (PetscInt k = 0; k < s->n && !o->kept.same; k++) {
-    if (Lambda[k] == 0) continue;
-    PetscCall(BodiesSolveRespond(o, k));
-    for (PetscInt j = 0; j < b->n; j++) {
-      const PetscReal *y = o->response[k * b->n + j];
-
-      if (y) HycoBodiesAdd(b->body[j].n, -Lambda[k] / o->kappa[j], y, o->u + b->start[j]);
-    }
-  }
+  PetscCall(HycoBodiesBend(o, Lambda));
+  for (PetscInt i = 0; i < b->ns; i++) o->u[i] = o->free[i] + o->bent[i];
   MoveRigidly(o);
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Adds the contacts outside the problem that penetrate in the present displacements; *more: there are some. */
-static void BodiesSolveJoin(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal size, PetscBool in[], Problem *p,
-                            PetscBool *more)
-{
-  *more = PETSC_FALSE;
-  for (PetscInt k = 0; k < s->n; k++) {
-    PetscReal gap = s->rows->gap[k];
-
-    /* An empty row is a contact without a master at this mu. */
-    if (in[k] || o->row_start[k] == o->row_start[k + 1]) continue;
-    for (PetscInt j = o->row_start[k]; j < o->row_start[k + 1]; j++) gap -= o->row[j] * o->u[o->row_at[j]];
-    if (gap >= -NO_PENETRATION * size) continue;
-    in[k] = *more = PETSC_TRUE;
-    p->contact[p->n++] = k;
-  }
 }
 
 /* least[]: by contact of the scene, the depth without contact from which contacts are in the first problem: half of the
@@ -863,97 +548,26 @@ static PetscErrorCode FirstDepth(HycoBodiesWork o, const HycoBodiesSurface *s, P
     least[c] = FIRST_DEPTH * deepest[c];
     if (spread > FLAT_DEPTH * deepest[c] && shallowest[c] > least[c]) least[c] = deepest[c] - NEAREST_DEPTH * spread;
     /* Penetration of round-off size must not choose the first contacts. */
-    least[c] = PetscMax(least[c], NO_PENETRATION * size);
+    least[c] = PetscMax(least[c], HYCO_NO_PENETRATION * size);
   }
   HycoFreeAll(&shallowest, &deepest);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Makes the problem that of every `stride`-th contact with a master. */
-static void TakeEvery(HycoBodiesWork o, const HycoBodiesSurface *s, PetscInt stride, PetscBool in[], Problem *p)
+/* o->active: the deepest contacts, from which the others join. */
+static PetscErrorCode ChooseFirst(HycoBodiesWork o, const HycoBodiesSurface *s)
 {
-  PetscInt n = 0;
-
-  p->n = 0;
-  for (PetscInt k = 0; k < s->n; k++) {
-    /* An empty row is a contact without a master at this mu. */
-    in[k] = (PetscBool)(o->row_start[k] < o->row_start[k + 1] && n++ % stride == 0);
-    if (in[k]) p->contact[p->n++] = k;
-  }
-}
-
-/* The first problem: the deepest contacts. Without the contacts that alone hold a body there is no depth: then one of
-   COARSE_STRIDE contacts, whose forces push the bodies together about as those of all do, so that the contacts which
-   these bodies still meet are few more than those that close. */
-static PetscErrorCode BodiesSolveBegin(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal size, PetscBool in[],
-                                       Problem *p)
-{
-  PetscReal *least;
-  PetscInt n = 0;
+  PetscReal *least, size = 0;
 
   PetscFunctionBegin;
-  if (o->bodies->p) {
-    for (PetscInt k = 0; k < s->n; k++) n += o->row_start[k] < o->row_start[k + 1];
-    TakeEvery(o, s, n > SMALL_PROBLEM ? COARSE_STRIDE : 1, in, p);
-    PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt k = 0; k < s->n; k++) {
+    if (o->row_start[k] < o->row_start[k + 1]) size = PetscMax(size, PetscAbsReal(o->gap[k]));
   }
   PetscCall(PetscMalloc1(s->fe->scene->n_contacts, &least));
   PetscCall(FirstDepth(o, s, size, least));
-  for (PetscInt k = 0; k < s->n; k++) {
-    in[k] = (PetscBool)(o->row_start[k] < o->row_start[k + 1] && -o->gap[k] > least[s->contact[k]]);
-    if (in[k]) p->contact[p->n++] = k;
-  }
+  for (PetscInt k = 0; k < s->n; k++)
+    o->active[k] = (PetscBool)(o->row_start[k] < o->row_start[k + 1] && -o->gap[k] > least[s->contact[k]]);
   PetscCall(PetscFree(least));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Takes from the first problem of some contacts those that it has opened: they stand for others, which may close. */
-static void DropOpen(HycoBodiesWork o, PetscBool in[], Problem *p)
-{
-  PetscInt n = 0;
-
-  for (PetscInt k = 0; k < p->n; k++) {
-    in[p->contact[k]] = o->active[k];
-    if (o->active[k]) p->contact[n++] = p->contact[k];
-  }
-  p->n = n;
-}
-
-/* Rounds of the problem, from the contacts that the displacements without contact close. */
-static PetscErrorCode SolveRounds(HycoBodiesWork o, const HycoBodiesSurface *s, Problem *p, PetscBool in[],
-                                  PetscReal Lambda[], PetscBool *solved)
-{
-  const HycoSubstructures b = o->bodies;
-  PetscReal size = 0;
-  PetscBool more = PETSC_TRUE;
-  PetscInt n = 0;
-
-  PetscFunctionBegin;
-  for (PetscInt k = 0; k < s->n; k++) {
-    if (o->row_start[k] == o->row_start[k + 1]) continue;
-    size = PetscMax(size, PetscAbsReal(o->gap[k]));
-    n++;
-  }
-  PetscCall(BodiesSolveBegin(o, s, size, in, p));
-  *solved = PETSC_TRUE;
-  PetscCall(PetscArrayzero(o->x, b->p));
-  /* Contacts only join, so that the rounds end; those that need no force get none from the problem itself. */
-  for (PetscInt round = 0; more && *solved && round < ROUNDS; round++) {
-    if (p->n) PetscCall(SolveProblem(o, p, Lambda, solved));
-    if (!*solved && b->p && p->n < n) {
-      /* Some contacts may not hold the bodies that all do. */
-      PetscCall(PetscArrayzero(Lambda, s->n));
-      TakeEvery(o, s, 1, in, p);
-      *solved = PETSC_TRUE;
-      continue;
-    }
-    PetscCall(BodiesSolveDisplace(o, s, Lambda));
-    if (!round && b->p && p->n < n) DropOpen(o, in, p);
-    BodiesSolveJoin(o, s, size, in, p, &more);
-  }
-  /* Penetrating contacts were left out of the last problem: its forces are no solution. */
-  if (*solved && more) o->reason = HYCO_DIVERGED_ITERATIONS;
-  *solved = (PetscBool)(*solved && !more);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -980,7 +594,7 @@ static PetscErrorCode BodiesSolveUpdate(HycoBodiesWork o, const HycoBodiesSurfac
 
   PetscFunctionBegin;
   /* Until all of it is there: an error leaves nothing that the next point could take over. */
-  o->prepared = PETSC_FALSE;
+  o->prepared = o->is_bent = PETSC_FALSE;
   if (first || c.nodes || c.stiffness) {
     PetscCall(TakeWeights(o, mu, alone));
     PetscCall(BodiesPlace(o, mu));
@@ -1008,6 +622,7 @@ PetscErrorCode HycoBodiesPrepare(HycoBodiesWork o, const HycoBodiesSurface *s, c
   PetscFunctionBegin;
   PetscCall(BodiesSolveUpdate(o, s, mu, PETSC_FALSE));
   PetscCall(PetscArrayzero(o->responded, s->n));
+  o->is_bent = PETSC_FALSE;
   PetscCall(HycoBodiesKeepRows(o, s->n));
   PetscCall(HycoBodiesStrain(o, s, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -1052,21 +667,26 @@ void HycoBodiesDisplacementsOfForces(HycoBodiesWork o, const HycoBodiesSurface *
   PetscCallVoid(BodiesSolveDisplace(o, s, Lambda));
 }
 
-/* Needs HycoBodiesPrepare(), and HycoBodiesStrain() for inelastic strains. Rank-local: models live on one process. */
+/* Needs HycoBodiesPrepare(), and HycoBodiesStrain() for inelastic strains. Rank-local: models live on one process.
+   Without the contacts that alone hold a body there is no depth to begin with. */
 PetscErrorCode HycoBodiesContact(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal Lambda[], PetscBool *solved)
 {
-  Problem p = {0};
-  PetscBool *in;
+  const char *method;
 
   PetscFunctionBegin;
-  o->its = 0;
-  o->reason = HYCO_CONVERGED;
-  PetscCall(PetscStrncpy(o->method, HYCO_SOLVER_ACTIVE_SET, sizeof(o->method)));
-  /* Contacts outside the last problem keep 0, and so do all if there is no solution. */
-  PetscCall(PetscArrayzero(Lambda, s->n));
-  PetscCall(PetscMalloc2(s->n + 1, &in, s->n + 1, &p.contact));
-  PetscCall(SolveRounds(o, s, &p, in, Lambda, solved));
-  PetscCall(PetscFree2(in, p.contact));
+  PetscCall(HycoBodiesUpdateSystem(o));
+  PetscCall(HycoSolverSetSystem(o->solver, o->system));
+  if (!o->bodies->p) PetscCall(ChooseFirst(o, s));
+  PetscCall(HycoSolverSetWorkingSet(o->solver, o->bodies->p ? NULL : o->active));
+  PetscCall(HycoSolverSolve(o->solver, o->motion, o->L));
+  PetscCall(HycoSolverGetReason(o->solver, &o->reason));
+  PetscCall(HycoSolverGetIterations(o->solver, &o->its));
+  PetscCall(HycoSolverGetMethod(o->solver, &method));
+  PetscCall(PetscStrncpy(o->method, method, sizeof(o->method)));
+  PetscCall(HycoVecRead(o->L, s->n, Lambda));
+  if (o->motion) PetscCall(HycoVecRead(o->motion, o->bodies->p, o->x));
+  PetscCall(BodiesSolveDisplace(o, s, Lambda));
+  *solved = (PetscBool)(o->reason > 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -1106,15 +726,6 @@ PetscReal HycoBodiesImbalance(HycoBodiesWork o, PetscBool beyond)
   most = HycoROMImbalance(b->p, b->ns, o->Z, NULL, o->f, load, size, beyond ? HYCO_LOADS_ROUND_OFF * all : 0);
   PetscCallAbort(PETSC_COMM_SELF, PetscFree2(load, size));
   return most;
-}
-
-void HycoBodiesMotionRow(HycoBodiesWork o, PetscInt k, PetscReal g[])
-{
-  const PetscInt p = o->bodies->p;
-
-  for (PetscInt i = 0; i < p; i++) g[i] = 0;
-  for (PetscInt e = o->row_start[k]; e < o->row_start[k + 1]; e++)
-    HycoBodiesAdd(p, o->row[e], o->Z + o->row_at[e] * p, g);
 }
 
 /* Whether the contacts with a force leave a rigid motion free, which is named. By the least eigenvalue of G^T G over

@@ -1,6 +1,6 @@
 /*
-  The dual form: the flexibility S = B K^-1 Bt and the gap without forces g = D - B K^-1 F, from one factorisation, and
-  the complementarity problem w = g + S L in the contact forces only, small and dense on every rank.
+  The dual form: the flexibility S = B K^-1 Bt + W and the gap without forces g = D - B K^-1 F, from one factorisation,
+  and the complementarity problem w = g + S L in the contact forces only, small and dense on every rank.
 */
 #include <hycosolverimpl.h>
 #include <string.h>
@@ -13,6 +13,8 @@ typedef struct {
   PetscInt m, p; /* numbers of contacts, and of unknowns pinned because K is singular: these come before the contacts
                     in S, g and L */
   PetscReal *S, *g, *L;
+  PetscReal *bare; /* S without a compliance; NULL: S is */
+  HycoOperatorState of_W;
   PetscBool *active;
   PetscBool started; /* active is the set of a solution */
   HycoConeFactor cone;
@@ -67,7 +69,7 @@ static PetscErrorCode DualResize(Dual *d, PetscInt m, PetscInt p)
   const PetscInt n = m + p;
 
   PetscFunctionBegin;
-  HycoFreeAll(&d->S, &d->g, &d->L, &d->active);
+  HycoFreeAll(&d->S, &d->g, &d->L, &d->bare, &d->active);
   PetscCall(PetscMalloc1((size_t)n * (size_t)n + 1, &d->S));
   PetscCall(PetscCalloc1(n + 1, &d->g));
   PetscCall(PetscCalloc1(n + 1, &d->L));
@@ -76,6 +78,38 @@ static PetscErrorCode DualResize(Dual *d, PetscInt m, PetscInt p)
   d->p = p;
   /* A set of other contacts is no start. */
   d->started = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* S += W. fresh: S is new; otherwise the factor of K, and S without the former W, are kept. */
+static PetscErrorCode DualAddCompliance(HycoSolver s, Dual *d, PetscBool fresh)
+{
+  Mat W = s->system->W;
+  const PetscInt m = d->m;
+  const size_t n = (size_t)(m + d->p);
+  PetscReal *block;
+  PetscInt *row;
+  PetscBool same = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  if (fresh) PetscCall(PetscFree(d->bare));
+  if (W) PetscCall(HycoOperatorStateUpdate(&d->of_W, W, NULL, &same));
+  if (!(W || d->bare) || (W && d->bare && same)) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoConeFactorForget(d->cone);
+  if (d->bare)
+    PetscCall(PetscArraycpy(d->S, d->bare, n * n));
+  else
+    HycoDuplicate(n * n, d->S, &d->bare);
+  if (!W) {
+    PetscCall(PetscFree(d->bare));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscMalloc2((size_t)m * (size_t)m, &block, m, &row));
+  for (PetscInt i = 0; i < m; i++) row[i] = i;
+  PetscCall(HycoSystemCompliance(s->system, m, row, m, block));
+  for (size_t k = 0; k < (size_t)m * (size_t)m; k++)
+    d->S[((size_t)d->p + k / (size_t)m) * n + (size_t)d->p + k % (size_t)m] += block[k];
+  PetscCall(PetscFree2(block, row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -95,8 +129,8 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
   }
   PetscCall(HycoStiffnessFactor(s, y->Bt, y->B, d->S, singular));
   if (d->made != s->stiffness.made) HycoConeFactorForget(d->cone);
-  /* The pins move by 1. */
-  if (d->made != s->stiffness.made && !*singular && y->K) HycoMotionsRound(p, y->m, NULL, d->S);
+  if (d->made != s->stiffness.made && !*singular) HycoMotionsRound(p, y->m, d->S);
+  if (!*singular) PetscCall(DualAddCompliance(s, d, (PetscBool)(d->made != s->stiffness.made)));
   d->made = s->stiffness.made;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -334,7 +368,7 @@ static PetscErrorCode DualRefine(HycoSolver s, HycoSolverForm form, PetscBool *b
 
   PetscFunctionBegin;
   *better = PETSC_FALSE;
-  if (!f->lu || !f->of.K || f->refined) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!f->lu || !f->of.K || f->refined || s->system->W) PetscFunctionReturn(PETSC_SUCCESS);
   /* For the comparison, and as the result where refinement changes nothing. */
   HycoDuplicate(entries, d->S, &before);
   HycoConeFactorForget(d->cone);
@@ -378,7 +412,7 @@ static PetscErrorCode DualSolve(HycoSolver s, HycoSolverForm form, Vec x, Vec L,
   PetscCall(SetForces(d, L));
   PetscCall(DualRecover(s, d, x, L));
   /* Reduced models: gaps that should be 0 have round-off of the dense factor, which one correction removes. */
-  if (s->stiffness.lu && !d->p && *solved && s->now.traits & HYCO_TAO_OWN && !s->system->blocks)
+  if (s->stiffness.lu && !s->system->W && !d->p && *solved && s->now.traits & HYCO_TAO_OWN && !s->system->blocks)
     PetscCall(CloseGaps(s, d, x, L));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -390,7 +424,7 @@ static PetscErrorCode DualDestroy(HycoSolverForm form)
   PetscFunctionBegin;
   PetscCall(HycoTaoDestroy(&d->tao));
   PetscCall(HycoConeFactorDestroy(&d->cone));
-  HycoFreeAll(&d->S, &d->g, &d->L, &d->active, &form->data);
+  HycoFreeAll(&d->S, &d->g, &d->L, &d->bare, &d->active, &form->data);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -404,7 +438,7 @@ PetscErrorCode HycoSolverFormCreate_Dual(HycoSolver s, HycoSolverForm form)
   PetscCall(PetscNew(&d));
   PetscCall(HycoTaoCreate(PETSC_COMM_SELF, (PetscObject)s, &d->tao));
   form->data = d;
-  form->cones = PETSC_TRUE;
+  form->cones = form->compliance = PETSC_TRUE;
   *form->ops = (struct _HycoSolverFormOps){.accepts = DualAccepts,
                                            .estimate = EstimateFactor,
                                            .setup = SetUp,

@@ -32,7 +32,7 @@ PetscInt HycoSolverTangentUndecided(HycoSolverTangent t)
 }
 
 /* The gaps of the contacts in the solution, on every rank. */
-static PetscErrorCode DualTangentGaps(HycoSolverTangent t, Vec x, PetscReal gap[])
+static PetscErrorCode DualTangentGaps(HycoSolverTangent t, Vec x, Vec L, PetscReal gap[])
 {
   HycoSystem y = t->s->system;
   PetscReal sizes[2];
@@ -45,6 +45,7 @@ static PetscErrorCode DualTangentGaps(HycoSolverTangent t, Vec x, PetscReal gap[
   PetscCall(VecNorm(y->D, NORM_INFINITY, &sizes[1]));
   t->size = PetscMax(sizes[0], sizes[1]);
   PetscCall(VecAYPX(y->work_L, -1, y->D));
+  if (y->W) PetscCall(HycoSystemAddCompliance(y, L, y->work_L, &t->size));
   PetscCall(HycoVecGather(y->work_L, gap));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -58,7 +59,7 @@ static PetscErrorCode DualTangentClose(HycoSolverTangent t, Vec x, Vec L, PetscB
   PetscFunctionBegin;
   HycoSolverGetCondensed(t->s, &t->m, &t->p, &S);
   PetscCall(PetscMalloc2(t->m, &force, t->m, &gap));
-  PetscCall(DualTangentGaps(t, x, gap));
+  PetscCall(DualTangentGaps(t, x, L, gap));
   PetscCall(HycoVecGather(L, force));
   PetscCall(HycoTangentCreate(t->p, PETSC_TRUE, t->m, S, force, gap, t->size, &t->tangent, regular));
   PetscCall(PetscFree2(force, gap));
@@ -66,7 +67,7 @@ static PetscErrorCode DualTangentClose(HycoSolverTangent t, Vec x, Vec L, PetscB
 }
 
 /* The gaps and slips of the last solve, whose cone has the pieces. */
-static PetscErrorCode TakePieces(HycoSolverTangent t, Vec x, Vec before)
+static PetscErrorCode TakePieces(HycoSolverTangent t, Vec x, Vec L, Vec before)
 {
   const PetscInt n = t->p + t->m;
 
@@ -76,7 +77,7 @@ static PetscErrorCode TakePieces(HycoSolverTangent t, Vec x, Vec before)
   PetscCall(PetscMalloc1(n + 1, &t->dw));
   PetscCall(PetscMalloc1(n + 1, &t->dmu));
   PetscCall(PetscMalloc1(t->m + 1, &t->before));
-  PetscCall(DualTangentGaps(t, x, t->w + t->p));
+  PetscCall(DualTangentGaps(t, x, L, t->w + t->p));
   PetscCall(HycoVecGather(before, t->before));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -104,7 +105,7 @@ static PetscErrorCode SetUp(HycoSolverTangent t, Vec x, Vec L, Vec before, Petsc
   PetscCall(PetscMalloc1(t->m + t->p, &t->q));
   PetscCall(PetscMalloc1(t->m + t->p, &t->z));
   if (s->system->blocks)
-    PetscCall(TakePieces(t, x, before));
+    PetscCall(TakePieces(t, x, L, before));
   else
     PetscCall(DualTangentClose(t, x, L, regular));
   PetscFunctionReturn(PETSC_SUCCESS);
