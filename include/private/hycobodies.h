@@ -394,8 +394,8 @@ PetscReal HycoBodiesLoadWork(HycoBodiesWork work, PetscInt motion);
 PetscBool HycoBodiesLoaded(HycoBodiesWork work);
 /* Of the loads' parts on all motions. */
 PetscReal HycoBodiesLoadRounding(HycoBodiesWork work);
-/* The contact system: D, F, B and W at the prepared parameters by HycoBodiesUpdateSystem(). HycoBodiesBend(): `bent` for
-   these forces. */
+/* The contact system: D, F, B and W at the prepared parameters by HycoBodiesUpdateSystem().
+   HycoBodiesBend(): `bent` of these forces. */
 PetscErrorCode HycoBodiesCreateSystem(HycoBodiesWork work);
 PetscErrorCode HycoBodiesDestroySystem(HycoBodiesWork work);
 PetscErrorCode HycoBodiesUpdateSystem(HycoBodiesWork work);
