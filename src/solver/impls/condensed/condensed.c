@@ -106,7 +106,7 @@ static PetscErrorCode TakeEvery(HycoSystem y, Condensed *f, PetscInt stride)
 
 /* The first problem: the working set. Without one every contact, or, where contact alone holds bodies, one of
    COARSE_STRIDE, whose forces push the bodies together about as those of all do, so that the contacts which these
-   bodies still meet are few more than those that close. *n: contacts that may close; *size: the largest gap of these. */
+   bodies still meet are few more than those that close. *n: contacts that may close; *size: their largest gap. */
 static PetscErrorCode CondensedBegin(HycoSolver s, Condensed *f, PetscInt *n, PetscReal *size)
 {
   HycoSystem y = s->system;
