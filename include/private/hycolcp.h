@@ -140,12 +140,12 @@ PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscRea
 /* The rank of a symmetric positive semidefinite matrix (k x k, overwritten), scaled to a unit diagonal, with
    tolerance 1e-12. */
 PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank);
-/* Sets to 0 the entries of a rigid motion, one for each contact, that are round-off of normals and of their
-   elimination: relative to the largest of them, or to `reach`, the motion's largest displacement of its body, if that
-   is more. */
-void HycoMotionRound(PetscInt n, PetscReal reach, PetscReal entry[]);
-/* The same of p motions that move their bodies by 1, in M (p + n, by columns). */
-void HycoMotionsRound(PetscInt p, PetscInt n, PetscReal M[]);
+/* Of the largest displacement of a contact along a rigid motion: below, it is round-off of normals, which are
+   differences of coordinates, eps of the mesh over a facet (tests/contact/friction.py: test_shrunk). */
+#define HYCO_TANGENTIAL 1e-12
+/* Sets to 0 the entries of p rigid motions in M (p + n, by columns) that are round-off of normals: relative to the
+   motion's largest displacement of a contact, or to reach[i] if that is more. */
+void HycoMotionsRound(PetscInt p, PetscInt n, const PetscReal reach[], PetscReal M[]);
 /*
   Whether forces of the blocks balance a load f on p motions, A r = f with A (p x rows, by columns); if not, r are those
   that come nearest. Less than `rounding` of f need not be balanced. True where it is not decided, as for laws other

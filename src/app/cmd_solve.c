@@ -257,6 +257,11 @@ static PetscErrorCode FillRow(HycoFOM fom, const HycoSummary *s, const Table *t,
   PetscFunctionBegin;
   PetscCall(HycoFOMGetHistory(fom, &h));
   solved = (PetscBool)(s->reason > 0 && (t->own == PATH_FORCE || h.ended));
+  if (s->reason == HYCO_DIVERGED_STEP && !h.n) {
+    for (PetscInt c = 0; c < t->width; c++) v[c] = NAN;
+    v[CONVERGED] = v[ITERATIONS] = 0;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   v[FORCE] = s->total_contact_force;
   v[LAMBDA_MAX] = s->lambda_max;
   v[ACTIVE] = s->n_active;
@@ -346,6 +351,7 @@ static PetscErrorCode SolveCommandPoints(HycoFOM fom, HycoScene scene, HycoSampl
   begin = HycoNow();
   for (PetscInt k = 0; k < n; k++) {
     HycoSummary s;
+    HycoHistory h;
 
     PetscCall(HycoFOMSolve(fom, n_par, mu + k * n_par));
     PetscCall(HycoFOMGetSummary(fom, &s));
@@ -356,7 +362,8 @@ static PetscErrorCode SolveCommandPoints(HycoFOM fom, HycoScene scene, HycoSampl
     if (k == 0) PetscCall(CreateTable(scene, s.dim, n, &t));
     if (s.reason > 0) u_relative = PetscMax(u_relative, s.u_relative);
     /* Before the gradient: after an error of it there is no solution to write. */
-    if (output[0]) PetscCall(HycoFOMWriteAdd(fom));
+    PetscCall(HycoFOMGetHistory(fom, &h));
+    if (output[0] && (h.n || s.reason != HYCO_DIVERGED_STEP)) PetscCall(HycoFOMWriteAdd(fom));
     PetscCall(FillRow(fom, &s, &t, &lacking, t.value + k * t.width));
     PetscCall(DriverSetPhase(k + 1, n));
   }

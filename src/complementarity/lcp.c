@@ -1,10 +1,6 @@
 /* The active set method for dense linear complementarity, w = q + M z >= 0, z >= 0, w.z = 0. */
 #include <hycolcp.h>
 
-/* Of the largest displacement of a contact along a rigid motion: below, it is round-off of normals, which are
-   differences of coordinates, eps of the mesh over a facet (tests/contact/friction.py: test_shrunk). */
-#define TANGENTIAL 1e-12
-
 /* Data of the iterations. */
 typedef struct {
   const HycoLCP *lcp;
@@ -117,23 +113,16 @@ PetscErrorCode HycoLCPActiveSet(const HycoLCP *lcp, PetscBool active[], PetscRea
 }
 
 /* Else a body would be moved by as much as it takes to open a contact to which the motion is tangential. */
-void HycoMotionRound(PetscInt n, PetscReal reach, PetscReal entry[])
-{
-  for (PetscInt j = 0; j < n; j++) reach = PetscMax(reach, PetscAbsReal(entry[j]));
-  for (PetscInt j = 0; j < n; j++) {
-    if (PetscAbsReal(entry[j]) <= TANGENTIAL * reach) entry[j] = 0;
-  }
-}
-
-void HycoMotionsRound(PetscInt p, PetscInt n, PetscReal M[])
+void HycoMotionsRound(PetscInt p, PetscInt n, const PetscReal reach[], PetscReal M[])
 {
   const size_t size = (size_t)(p + n);
 
   for (size_t i = 0; i < (size_t)p; i++) {
-    /* The pins move by 1. */
-    HycoMotionRound(n, 1, M + i * size + p);
+    PetscReal most = reach[i];
+
+    for (size_t j = (size_t)p; j < size; j++) most = PetscMax(most, PetscAbsReal(M[i * size + j]));
     for (size_t j = (size_t)p; j < size; j++) {
-      if (M[i * size + j] == 0) M[j * size + i] = 0;
+      if (PetscAbsReal(M[i * size + j]) <= HYCO_TANGENTIAL * most) M[i * size + j] = M[j * size + i] = 0;
     }
   }
 }

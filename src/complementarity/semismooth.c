@@ -604,6 +604,13 @@ static PetscErrorCode FromNormal(Newton *h, PetscReal z[], HycoLCPStatus *status
     /* What soft springs alone resist without friction must not run far away: it is of no use to the start. */
     if (j < p && h->lcp->springs) M[(size_t)j * (size_t)(m + 1)] += START_SPRING * h->flexibility;
   }
+  /* Where only tangents see a motion, its round-off in the normals would be all that there is of it. */
+  for (PetscInt i = 0; i < p; i++) {
+    for (PetscInt j = p; j < h->n; j++)
+      forces[i] = PetscMax(forces[i], PetscAbsReal(h->M[(size_t)i * (size_t)h->n + (size_t)j]));
+  }
+  HycoMotionsRound(p, b->n, forces, M);
+  PetscCall(PetscArrayzero(forces, p));
   /* Floating bodies start with all contacts closed (semidefinite.c); others from the contacts with a force. */
   for (PetscInt k = 0; k < b->n; k++) active[k] = (PetscBool)(p > 0 || z[row[k]] > 0);
   normal.M = M;

@@ -33,6 +33,16 @@ static PetscErrorCode LeastDistance(PetscInt p, PetscInt n, const PetscReal E[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The opening of a row by motion i of M, without round-off. */
+static PetscReal UnloadOpening(PetscInt N, PetscInt p, const PetscReal M[], PetscInt i, PetscInt row)
+{
+  const PetscReal *column = M + (size_t)i * (size_t)N;
+  PetscReal most = 0;
+
+  for (PetscInt j = p; j < N; j++) most = PetscMax(most, PetscAbsReal(column[j]));
+  return PetscAbsReal(column[row]) > HYCO_TANGENTIAL * most ? column[row] : 0;
+}
+
 /* M: N x N by columns, of which the first p are G; row[n]: the contacts' normal rows. x stays where it leaves no gap
    negative. */
 PetscErrorCode HycoLCPUnload(PetscInt N, PetscInt p, PetscInt n, const PetscInt row[], const PetscReal M[],
@@ -47,7 +57,7 @@ PetscErrorCode HycoLCPUnload(PetscInt N, PetscInt p, PetscInt n, const PetscInt 
     PetscReal *column = E + k * (p + 1), w = q[row[k]];
 
     for (PetscInt i = 0; i < p; i++) {
-      column[i] = M[(size_t)i * (size_t)N + (size_t)row[k]];
+      column[i] = UnloadOpening(N, p, M, i, row[k]);
       w += column[i] * x[i];
       unit = PetscMax(unit, PetscAbsReal(column[i]));
     }

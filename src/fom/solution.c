@@ -185,10 +185,17 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   HycoCheckGiven(out);
   s = &f->summary;
-  PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMGetSummary()");
   s->dim = f->fe->dim;
   s->n_dof = f->n_free;
   s->n_contacts = f->n_contacts;
+  /* A path without a listed time has no more than this. */
+  if (!f->solved && f->path && f->path->why[0]) {
+    *out = (HycoSummary){.dim = s->dim, .n_dof = s->n_dof, .n_contacts = s->n_contacts, .seconds = s->seconds};
+    out->reason = HYCO_DIVERGED_STEP;
+    PetscCall(PetscStrncpy(out->why, f->path->why, sizeof(out->why)));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMGetSummary()");
   /* given: forces were prescribed, and another solver was used. */
   PetscCall(HycoSolverGetIterations(f->given ? f->given_solver : f->solver, &s->iterations));
   PetscCall(HycoSolverGetKKT(f->solver, &s->kkt));

@@ -272,12 +272,6 @@ static PetscErrorCode UpdateMotions(HycoBodiesWork o)
     HycoBodiesMotionRow(o, k, g);
     for (PetscInt i = 0; i < p; i++) o->rows_B[(size_t)i * (size_t)m + (size_t)k] = g[i];
   }
-  for (PetscInt i = 0; i < p; i++) {
-    PetscReal reach = 0;
-
-    for (PetscInt j = 0; j < o->bodies->ns; j++) reach = PetscMax(reach, PetscAbsReal(o->Z[j * p + i]));
-    HycoMotionRound(m, reach, o->rows_B + (size_t)i * (size_t)m);
-  }
   PetscCall(PetscObjectStateIncrease((PetscObject)o->B));
   PetscCall(PetscFree(g));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -129,7 +129,6 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
   }
   PetscCall(HycoStiffnessFactor(s, y->Bt, y->B, d->S, singular));
   if (d->made != s->stiffness.made) HycoConeFactorForget(d->cone);
-  if (d->made != s->stiffness.made && !*singular) HycoMotionsRound(p, y->m, d->S);
   if (!*singular) PetscCall(DualAddCompliance(s, d, (PetscBool)(d->made != s->stiffness.made)));
   d->made = s->stiffness.made;
   PetscFunctionReturn(PETSC_SUCCESS);
