@@ -188,9 +188,9 @@ PetscErrorCode HycoROMGetInelastic(HycoROM model, PetscInt *n_cells, const Petsc
   Residuals of the last prediction of a path in the full-order equations, without a full-order solve, at each listed
   time that it reached (n), as fractions. residual: that of equilibrium on the whole mesh, |f_int - F + B^T L| in the
   dual of the elastic energy norm, divided by the largest |u| of the path in that norm. contact: |min(g, c L)| with the
-  gaps g = D - B u, divided by the largest |B u| of the path, where c is the largest |B u| divided by the largest
-  contact force. Arrays are borrowed until the next call. why: NULL, or the reason of a failure; worst and worst_contact
-  are then infinite, and n is 0.
+  gaps g = D - B u, divided by d, where c is d divided by the largest contact force. d: the largest displacement of
+  the path at the contacts, |B u|, or |u| of the slaves where that is more. Arrays are borrowed until the next call.
+  why: NULL, or the reason of a failure; worst and worst_contact are then infinite, and n is 0.
 */
 typedef struct {
   PetscInt n, at; /* at: the listed time of the worst residual */

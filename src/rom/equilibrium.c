@@ -16,10 +16,11 @@ struct _n_HycoBalance {
   Mat K;
   KSP ksp;
   Vec r, x;
-  HycoRows rows;                    /* of B over dofs of the whole mesh */
-  PetscReal *load, *energy;         /* n_dof; n_cells */
-  PetscReal *gap, *size, *approach; /* of the last path: n_listed x n_contacts; by listed time |u| and |B u| */
-  PetscReal *residual, *contact;    /* by listed time */
+  HycoRows rows;            /* of B over dofs of the whole mesh */
+  PetscReal *load, *energy; /* n_dof; n_cells */
+  PetscReal *gap, *size,
+      *approach; /* of the last path: n_listed x n_contacts; by listed time |u| and |B u|, or |u| of the slaves */
+  PetscReal *residual, *contact; /* by listed time */
   char why[HYCO_LINE];
   HycoEquilibrium last;
 };
@@ -127,16 +128,17 @@ static void AddFriction(HycoROM m, PetscReal f[])
   }
 }
 
-/* Adds B^T L to f, and stores the gaps and the displacements at the contacts, for listed time j. */
+/* Adds B^T L to f, and stores the gaps and the displacements at the contacts, for listed time j. Of surfaces that stay
+   closed B u is round-off, and their size is that of the slaves' displacements. */
 static void AddContact(HycoROM m, HycoBalance b, PetscInt j, PetscReal f[])
 {
   const HycoRows *B = &b->rows;
-  const PetscInt n = m->model->pairs.n;
+  const PetscInt n = m->model->pairs.n, dim = m->fe_whole->dim;
   const PetscReal *L = m->trace.Lambda + (size_t)j * (size_t)n;
 
   b->approach[j] = 0;
   for (PetscInt k = 0; k < n; k++) {
-    PetscReal bu = 0;
+    PetscReal bu = 0, slave = 0;
 
     for (PetscInt i = B->start[k]; i < B->start[k + 1]; i++) {
       /* U_whole is the displacement of time j: EquilibriumTimeLoop() has set it before this call. */
@@ -144,7 +146,8 @@ static void AddContact(HycoROM m, HycoBalance b, PetscInt j, PetscReal f[])
       f[B->dof[i]] += B->value[i] * L[k];
     }
     b->gap[(size_t)j * (size_t)n + (size_t)k] = B->gap[k] - bu;
-    b->approach[j] += bu * bu;
+    for (PetscInt c = 0; c < dim; c++) slave += PetscSqr(m->U_whole[m->whole_pairs.slave[k] * dim + c]);
+    b->approach[j] += PetscMax(bu * bu, slave);
   }
   b->approach[j] = PetscSqrtReal(b->approach[j]);
 }

@@ -379,6 +379,8 @@ class Friction(Case):
                 report = self.hyco(*args, '-mu', str(s))
                 self.assertFalse(report['position_arbitrary'])
                 self.near(report['history']['outputs']['move'][2], 0.1 * s / 3, 0.2)
+        # The surfaces stay closed, and B u is round-off.
+        self.assertLess(self.hyco('predict', '-model', 'turns.h5', '-mu', '0.04', '-hyco_residual')['equilibrium']['worst_contact'], 1e-8)
 
     def test_creep(self):
         """Bodies that creep: Newton's method outside, the law of contact inside."""
