@@ -355,7 +355,7 @@ void DriverReportModel(cJSON *json, const Search *search, const HycoTraining *tr
 /* -- steps.c: the listed times of a path; reduced: those of predict, whose values are those of the RID -- */
 
 /* Prints a line on rank 0; n: number of listed times of the scene. */
-PetscErrorCode DriverPrintStep(const HycoStep *step, PetscInt n);
+PetscErrorCode DriverPrintStep(const HycoStep *step, PetscInt n, PetscBool reduced);
 /* Says that contact forces are not unique, if there are dependent contacts: of a path with the listed times. */
 PetscErrorCode DriverPrintDependent(PetscInt n_dependent, PetscInt n, const HycoStep step[]);
 /* What forces and moments miss of balance; < 0: not compared. */

@@ -31,7 +31,7 @@ PetscErrorCode DriverPrintReducedPath(HycoScene scene, const PetscReal mu[], con
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
-  for (PetscInt k = 0; k < path->n; k++) PetscCall(DriverPrintStep(&path->step[k], n_times));
+  for (PetscInt k = 0; k < path->n; k++) PetscCall(DriverPrintStep(&path->step[k], n_times, PETSC_TRUE));
   PetscCall(DriverWarnSteps(path->time_error));
   PetscCall(DriverWriteSteps(table, scene, mu, PETSC_TRUE, path->n, path->step));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -10,7 +10,7 @@ PetscErrorCode DriverMonitorStep(HycoFOM fom, const HycoStep *s, void *ctx)
 
   PetscFunctionBegin;
   (void)fom;
-  PetscCall(DriverPrintStep(s, path->n));
+  PetscCall(DriverPrintStep(s, path->n, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

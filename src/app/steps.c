@@ -81,15 +81,15 @@ static PetscReal ValueOf(const Column *c, const HycoStep *s)
 }
 
 /* A line as soon as a listed time is reached: paths may take hours. The widths are those of usual values, so that
-   lines are aligned. */
-PetscErrorCode DriverPrintStep(const HycoStep *s, PetscInt n)
+   lines are aligned. reduced: the stress is that of the RID's cells. */
+PetscErrorCode DriverPrintStep(const HycoStep *s, PetscInt n, PetscBool reduced)
 {
   PetscFunctionBegin;
   PetscCall(DriverPrint(
-      "t %-11.10g %3d of %d: %d step%s, %d iteration%s%s, %d closed, force %.8g, inelastic %.3g, mises %.5g\n",
+      "t %-11.10g %3d of %d: %d step%s, %d iteration%s%s, %d closed, force %.8g, inelastic %.3g, mises%s %.5g\n",
       (double)s->t, (int)s->index + 1, (int)n, (int)s->substeps, s->substeps == 1 ? "" : "s", (int)s->iterations,
       s->iterations == 1 ? "" : "s", s->cuts ? ", cut" : "", (int)s->n_active, (double)s->total_contact_force,
-      (double)s->inelastic, (double)s->mises));
+      (double)s->inelastic, reduced ? " of the RID" : "", (double)s->mises));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -121,7 +121,8 @@ PetscErrorCode DriverPrintBalance(PetscReal balance)
     PetscCall(DriverPrint("balance of loads, contact and supports, forces and moments of each body: to %.1e\n",
                           (double)balance));
   else
-    PetscCall(DriverPrint("balance of forces: not compared, supports carry what is left\n"));
+    PetscCall(
+        DriverPrint("balance of forces: not compared, as supports carry what is left, or the path ended early\n"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
