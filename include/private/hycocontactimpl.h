@@ -61,9 +61,8 @@ typedef struct {
 typedef struct {
   PetscBool moved; /* a map may move them */
   PetscReal small; /* a tenth of the shortest edge of the slave's facets; 0: it has none */
-  PetscInt edges;  /* bits: the slave, the master goes round an edge; the slave closes on itself, or goes round one */
+  PetscInt edges;  /* bits: HYCO_SLAVE_EDGE and so on (nearest.h) */
 } HycoSurfaceFacts;
-enum { HYCO_SLAVE_EDGE = 1, HYCO_MASTER_EDGE = 2, HYCO_EDGES = 3, HYCO_SLAVE_ROUND = 4 };
 
 /* Friction in a solution, by contact: 3 components in the scene's axes. */
 typedef struct {

@@ -4,6 +4,9 @@
 #include <hycomesh.h>
 
 /* -- begin: in exported models too -- */
+/* Bits: the slave, the master goes round an edge, or either does; the slave closes on itself, or goes round one. */
+enum { HYCO_SLAVE_EDGE = 1, HYCO_MASTER_EDGE = 2, HYCO_EDGES = 3, HYCO_SLAVE_ROUND = 4 };
+
 /* A point of a patch: sum of weight[a] times node[a]. Weights have sum 1, and are positive on patches of first order;
    nodes are in ascending order. n = 0: no point. */
 typedef struct {

@@ -45,7 +45,7 @@ ELSEWHERE = {'missed', 'options_from.SOURCE', 'unseen_feature', 'fallback', 'gre
              'contacts[].stiffness_over_master_min', 'contacts[].stiffness_over_master_max', 'estimate.bodies_refused',
              'equilibrium.worst', 'equilibrium.t', 'equilibrium.worst_contact', 'equilibrium.residual', 'equilibrium.contact',
              'training_error_u', 'training_error_lambda_rid', 'condition', 'ties[].name', 'ties[].n_nodes', 'gradient_kinks[].output', 'gradient_kinks[].parameter',
-             'gradient_kinks[].t', 'without_gradient'}
+             'gradient_kinks[].t', 'without_gradient', 'no_equilibrium'}
 
 
 def listed():

@@ -174,7 +174,8 @@ class Quadratic(Case):
                     found = self.hyco('compare', '-scene', scene, '-model', f'{kind}.h5', '-grid', '2,2', ranks=2)
                     self.assertLess(found['error_u']['max'], 0.02)
                     self.assertLess(found['error_u_h1']['max'], 0.05)
-                    model = self.hyco('predict', '-model', f'{kind}.h5', '-mu', '0.27,310')
+                    # modes of a projection that do not change the gaps give no forces, which do not balance the reactions
+                    model = self.hyco('predict', '-model', f'{kind}.h5', '-mu', '0.27,310', status=3 * (of == 'projection'))
                     for name, value in full[0]['outputs'].items():
                         self.near(model['outputs'][name], value, 0.05, name)
 

@@ -180,7 +180,8 @@ class Solids(Case):
                         self.assertLess(found['error_lambda']['max'], 1 + 1e-9)
                         many = self.hyco('compare', '-scene', scene, '-model', f'{kind}.h5', '-scatter', 20)
                         self.assertLess(many['error_lambda']['max'], 1 + 1e-9)
-                    model = self.hyco('predict', '-model', f'{kind}.h5', '-mu', '0.27,310')
+                    # modes of a projection that do not change the gaps give no forces, which do not balance the reactions
+                    model = self.hyco('predict', '-model', f'{kind}.h5', '-mu', '0.27,310', status=3 * (of == 'projection'))
                     for name, value in full[0]['outputs'].items():
                         self.near(model['outputs'][name], value, 0.05, name)
             with self.subTest(kind=kind, type='whole'):

@@ -256,7 +256,8 @@ class TiesQuadratic(Case):
                     found = self.hyco('compare', '-scene', scene, '-model', f'{kind}.h5', '-grid', '2,2', ranks=2)
                     for name in ('error_u', 'error_u_h1', 'error_sigma', *(('error_lambda',) if of != 'projection' else ())):
                         self.assertLess(found[name]['max'], bound, name)
-                    model = self.hyco('predict', '-model', f'{kind}.h5', '-mu', '0.27,310')
+                    # modes of a projection that do not change the gaps give no forces, which do not balance the reactions
+                    model = self.hyco('predict', '-model', f'{kind}.h5', '-mu', '0.27,310', status=3 * (of == 'projection'))
                     for name in ('hold', 'low', *(('most',) if of != 'projection' else ())):
                         self.near(model['outputs'][name], full[0]['outputs'][name], bound, name)
 
