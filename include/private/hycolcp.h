@@ -143,8 +143,10 @@ PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank);
 /* Of the largest displacement of a contact along a rigid motion: below, it is round-off of normals, which are
    differences of coordinates, eps of the mesh over a facet (tests/contact/friction.py: test_shrunk). */
 #define HYCO_TANGENTIAL 1e-12
-/* Sets to 0 the entries of p rigid motions in M (p + n, by columns) that are round-off of normals: relative to the
-   motion's largest displacement of a contact, or to reach[i] if that is more. */
+/* That displacement, of the i-th of p motions in M (N x N, by columns), tangents included. */
+PetscReal HycoMotionReach(PetscInt N, PetscInt p, const PetscReal M[], PetscInt i);
+/* Sets to 0 the entries of p rigid motions in M (p + n, by columns) that are round-off of normals: by reach[i], which
+   is that of these rows and of those left out of M. */
 void HycoMotionsRound(PetscInt p, PetscInt n, const PetscReal reach[], PetscReal M[]);
 /*
   Whether forces of the blocks balance a load f on p motions, A r = f with A (p x rows, by columns); if not, r are those

@@ -112,17 +112,22 @@ PetscErrorCode HycoLCPActiveSet(const HycoLCP *lcp, PetscBool active[], PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscReal HycoMotionReach(PetscInt N, PetscInt p, const PetscReal M[], PetscInt i)
+{
+  PetscReal most = 0;
+
+  for (PetscInt j = p; j < N; j++) most = PetscMax(most, PetscAbsReal(M[(size_t)i * (size_t)N + (size_t)j]));
+  return most;
+}
+
 /* Else a body would be moved by as much as it takes to open a contact to which the motion is tangential. */
 void HycoMotionsRound(PetscInt p, PetscInt n, const PetscReal reach[], PetscReal M[])
 {
   const size_t size = (size_t)(p + n);
 
   for (size_t i = 0; i < (size_t)p; i++) {
-    PetscReal most = reach[i];
-
-    for (size_t j = (size_t)p; j < size; j++) most = PetscMax(most, PetscAbsReal(M[i * size + j]));
     for (size_t j = (size_t)p; j < size; j++) {
-      if (PetscAbsReal(M[i * size + j]) <= HYCO_TANGENTIAL * most) M[i * size + j] = M[j * size + i] = 0;
+      if (PetscAbsReal(M[i * size + j]) <= HYCO_TANGENTIAL * reach[i]) M[i * size + j] = M[j * size + i] = 0;
     }
   }
 }

@@ -605,10 +605,7 @@ static PetscErrorCode FromNormal(Newton *h, PetscReal z[], HycoLCPStatus *status
     if (j < p && h->lcp->springs) M[(size_t)j * (size_t)(m + 1)] += START_SPRING * h->flexibility;
   }
   /* Where only tangents see a motion, its round-off in the normals would be all that there is of it. */
-  for (PetscInt i = 0; i < p; i++) {
-    for (PetscInt j = p; j < h->n; j++)
-      forces[i] = PetscMax(forces[i], PetscAbsReal(h->M[(size_t)i * (size_t)h->n + (size_t)j]));
-  }
+  for (PetscInt i = 0; i < p; i++) forces[i] = HycoMotionReach(h->n, p, h->M, i);
   HycoMotionsRound(p, b->n, forces, M);
   PetscCall(PetscArrayzero(forces, p));
   /* Floating bodies start with all contacts closed (semidefinite.c); others from the contacts with a force. */

@@ -33,16 +33,6 @@ static PetscErrorCode LeastDistance(PetscInt p, PetscInt n, const PetscReal E[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The opening of a row by motion i of M, without round-off. */
-static PetscReal UnloadOpening(PetscInt N, PetscInt p, const PetscReal M[], PetscInt i, PetscInt row)
-{
-  const PetscReal *column = M + (size_t)i * (size_t)N;
-  PetscReal most = 0;
-
-  for (PetscInt j = p; j < N; j++) most = PetscMax(most, PetscAbsReal(column[j]));
-  return PetscAbsReal(column[row]) > HYCO_TANGENTIAL * most ? column[row] : 0;
-}
-
 /* M: N x N by columns, of which the first p are G; row[n]: the contacts' normal rows. x stays where it leaves no gap
    negative. */
 PetscErrorCode HycoLCPUnload(PetscInt N, PetscInt p, PetscInt n, const PetscInt row[], const PetscReal M[],
@@ -53,17 +43,25 @@ PetscErrorCode HycoLCPUnload(PetscInt N, PetscInt p, PetscInt n, const PetscInt 
   PetscFunctionBegin;
   *exists = PETSC_TRUE;
   PetscCall(PetscMalloc2(n * (p + 1) + 1, &E, p + 1, &d));
-  for (PetscInt k = 0; k < n; k++) {
-    PetscReal *column = E + k * (p + 1), w = q[row[k]];
+  for (PetscInt k = 0; k < n; k++) E[k * (p + 1) + p] = q[row[k]];
+  for (PetscInt i = 0; i < p; i++) {
+    const PetscReal round_off = HYCO_TANGENTIAL * HycoMotionReach(N, p, M, i);
 
-    for (PetscInt i = 0; i < p; i++) {
-      column[i] = UnloadOpening(N, p, M, i, row[k]);
-      w += column[i] * x[i];
+    for (PetscInt k = 0; k < n; k++) {
+      const PetscReal entry = M[(size_t)i * (size_t)N + (size_t)row[k]];
+      PetscReal *column = E + k * (p + 1);
+
+      column[i] = PetscAbsReal(entry) > round_off ? entry : 0;
+      column[p] += column[i] * x[i];
       unit = PetscMax(unit, PetscAbsReal(column[i]));
     }
-    column[p] = -w;
-    most = PetscMax(most, PetscAbsReal(w));
-    least = PetscMin(least, w);
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    PetscReal *w = &E[k * (p + 1) + p];
+
+    most = PetscMax(most, PetscAbsReal(*w));
+    least = PetscMin(least, *w);
+    *w = -*w;
   }
   /* In units of the largest gap and of the motion that changes one by as much: both rows of E and d are of size 1, so
      that r_last does not cancel. */
